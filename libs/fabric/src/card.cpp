@@ -1,0 +1,1 @@
+#include "toile/fabric/card.h"
