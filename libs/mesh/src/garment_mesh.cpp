@@ -1,5 +1,7 @@
 #include "toile/mesh/garment_mesh.h"
 
+#include <Eigen/Geometry>
+
 #include "toile/base/text.h"
 #include "toile/mesh/support_mesh.h"
 #include "toile/mesh/topology.h"

@@ -51,6 +51,14 @@ std::string block_yaml(const T& record) {
   return block_yaml(*record_type<T>(), &record);
 }
 
+/// The same with bare SI numbers, for files that programs write; read with Units::si.
+std::string block_yaml_si(const RecordType& type, const void* record);
+
+/// A field's doc with its unit, range, choices and source on one line.
+std::string field_summary(const Field& field);
+/// `0.1 to 5 m`, `at least 0`, or nothing.
+std::string range_text(const Field& field);
+
 /// JSON schema (draft 2020-12) of the spec.
 std::string json_schema(const RecordType& type, const std::string& title);
 

@@ -1,0 +1,234 @@
+#include <algorithm>
+
+#include "ply_format.h"
+#include "toile/io/file.h"
+#include "toile/io/ply.h"
+#include "toile/io/record_yaml.h"
+
+namespace toile::io {
+namespace {
+
+constexpr const char* garment_magic = "toile-garment 1";
+
+/// The tables that stand as YAML in the file's comments.
+struct Header {
+  std::map<std::string, std::string> units{{"length", "m"}, {"angle", "rad"}, {"mass", "kg"}, {"time", "s"}};
+  std::vector<mesh::Panel> panels;
+  std::vector<mesh::Run> runs;
+  std::vector<mesh::NamedPoint> points;
+  std::vector<fabric::Card> fabrics;
+  std::vector<mesh::Laminate> laminates;
+  std::vector<mesh::Seam> seams;
+  std::map<std::string, std::string> marks;
+  std::vector<mesh::RouteEntry> route;
+  static void describe(auto& f) {
+    f(&Header::units, {.key = "units", .doc = "units of all numbers"});
+    f(&Header::panels, {.key = "panels", .doc = "panels"});
+    f(&Header::runs, {.key = "runs", .doc = "named lines of panels"});
+    f(&Header::points, {.key = "points", .doc = "named points of panels"});
+    f(&Header::fabrics, {.key = "fabrics", .doc = "fabric cards"});
+    f(&Header::laminates, {.key = "laminates", .doc = "what faces are made of"});
+    f(&Header::seams, {.key = "seams", .doc = "seams"});
+    f(&Header::marks, {.key = "marks", .doc = "facts that a stage leaves for later ones"});
+    f(&Header::route, {.key = "route", .doc = "stages that the garment went through"});
+  }
+};
+
+// name, element, type, unit, meaning, comparison tolerance. Positions: 1 um is far below any tolerance of the trade and far
+// above what differs between compilers.
+constexpr ColumnInfo registry[] = {
+    {"vertex", "x", "double", "m", "position", 1e-6},
+    {"vertex", "y", "double", "m", "position", 1e-6},
+    {"vertex", "z", "double", "m", "position", 1e-6},
+    {"vertex", "u", "double", "m", "panel coordinate along the weft", 1e-9},
+    {"vertex", "v", "double", "m", "panel coordinate along the warp", 1e-9},
+    {"vertex", "panel", "int", "", "panel id", 0},
+    {"vertex", "vx", "double", "m/s", "velocity", 1e-5},
+    {"vertex", "vy", "double", "m/s", "velocity", 1e-5},
+    {"vertex", "vz", "double", "m/s", "velocity", 1e-5},
+    {"vertex", "seam_gap", "double", "m", "distance to the particle it is sewn to", 1e-6},
+    {"vertex", "ease", "double", "m", "distance to the support", 1e-6},
+    {"face", "vertex_indices", "list", "", "three vertex ids, counter-clockwise from the face side", 0},
+    {"face", "panel", "int", "", "panel id", 0},
+    {"face", "laminate", "int", "", "laminate id, -1: none yet", 0},
+    {"face", "strain_warp", "double", "1", "elongation along the warp", 1e-5},
+    {"face", "strain_weft", "double", "1", "elongation along the weft", 1e-5},
+    {"face", "strain_bias", "double", "1", "elongation along the bias", 1e-5},
+    {"face", "shear", "double", "rad", "change of the angle between warp and weft", 1e-5},
+    {"face", "tension_warp", "double", "N/m", "tension along the warp", 1e-2},
+    {"face", "tension_weft", "double", "N/m", "tension along the weft", 1e-2},
+    {"weld", "a", "int", "", "vertex id", 0},
+    {"weld", "b", "int", "", "vertex id of the same particle", 0},
+    {"weld", "seam", "int", "", "seam id", 0},
+    {"fastener", "a", "int", "", "vertex id", 0},
+    {"fastener", "b", "int", "", "vertex id", 0},
+    {"fastener", "kind", "int", "", "0 button, 1 hook, 2 snap", 0},
+    {"fastener", "mass", "double", "kg", "mass, shared between the two", 1e-9},
+    {"fastener", "length", "double", "m", "distance at which the two are held", 1e-9},
+    {"run_vertex", "run", "int", "", "run id", 0},
+    {"run_vertex", "vertex", "int", "", "vertex id", 0},
+    {"run_vertex", "s", "double", "m", "arc length along the run's true curve", 1e-9},
+};
+
+std::vector<double> column_of(const mesh::Points3& points, int k) {
+  std::vector<double> values(static_cast<std::size_t>(points.rows()));
+  for (Eigen::Index i = 0; i < points.rows(); ++i) values[static_cast<std::size_t>(i)] = points(i, k);
+  return values;
+}
+
+template <class Items, class Get>
+auto gather(const Items& items, Get get) {
+  std::vector<decltype(get(items.front()))> values;
+  values.reserve(items.size());
+  for (const auto& item : items) values.push_back(get(item));
+  return values;
+}
+
+std::vector<int> ids_of(const mesh::Ids& ids) { return {ids.data(), ids.data() + ids.size()}; }
+mesh::Ids to_ids(const std::vector<int>& values) { return Eigen::Map<const mesh::Ids>(values.data(), static_cast<Eigen::Index>(values.size())); }
+
+ply::Property to_property(const std::string& name, const mesh::Column& column) {
+  return column.integer ? ply::integer_column(name, column.integers) : ply::real_column(name, column.reals);
+}
+
+std::map<std::string, mesh::Column> further_columns(const ply::Columns& columns) {
+  std::map<std::string, mesh::Column> result;
+  for (const ply::Property* property : columns.rest()) {
+    if (property->list) continue;
+    result[property->name] = mesh::Column{!ply::is_real(property->type), property->reals, property->integers};
+  }
+  return result;
+}
+
+bool has_magic(const ply::Document& document, const char* magic) { return std::find(document.comments.begin(), document.comments.end(), magic) != document.comments.end(); }
+
+}  // namespace
+
+std::span<const ColumnInfo> column_registry() { return registry; }
+
+Result<mesh::GarmentMesh> parse_garment(std::string_view bytes, const std::string& name) {
+  TOILE_TRY(const ply::Document document, ply::parse(bytes, name));
+  if (!has_magic(document, garment_magic)) {
+    return Issue{"not_a_garment", {.file = name}, "this PLY file is not a garment (no comment 'toile-garment 1')", "give a file that toile-mesh or a later stage wrote"};
+  }
+  Header header;
+  Issues issues = read_record(ply::metadata(document), name, *record_type<Header>(), &header, Units::si);
+  // Positions inside the YAML are not lines of the file.
+  for (Issue& issue : issues) issue.place.line = issue.place.column = 0;
+  static constexpr std::string_view known[] = {"vertex", "face", "weld", "fastener", "run_vertex"};
+  for (const ply::Element& element : document.elements) {
+    if (std::find(std::begin(known), std::end(known), element.name) == std::end(known)) {
+      issues.push_back({"bad_ply", {.file = name}, fmt::format("the element '{}' is not known", element.name), "the file was written by a newer version or another program"});
+    }
+  }
+  mesh::GarmentMesh garment;
+  garment.panels = std::move(header.panels);
+  garment.runs = std::move(header.runs);
+  garment.points = std::move(header.points);
+  garment.fabrics = std::move(header.fabrics);
+  garment.laminates = std::move(header.laminates);
+  garment.seams = std::move(header.seams);
+  garment.marks = std::move(header.marks);
+  garment.route = std::move(header.route);
+
+  ply::Columns vertex(document, name, "vertex", issues);
+  const auto nv = static_cast<Eigen::Index>(vertex.rows());
+  garment.x.resize(nv, 3);
+  garment.uv.resize(nv, 2);
+  const char* axes[] = {"x", "y", "z"};
+  for (int k = 0; k < 3; ++k) garment.x.col(k) = Eigen::Map<const Eigen::VectorXd>(vertex.reals(axes[k]).data(), nv);
+  garment.uv.col(0) = Eigen::Map<const Eigen::VectorXd>(vertex.reals("u").data(), nv);
+  garment.uv.col(1) = Eigen::Map<const Eigen::VectorXd>(vertex.reals("v").data(), nv);
+  garment.vertex_panel = to_ids(vertex.integers("panel"));
+  garment.vertex_columns = further_columns(vertex);
+
+  ply::Columns face(document, name, "face", issues);
+  garment.faces = Eigen::Map<const mesh::Triangles>(face.triples("vertex_indices").data(), static_cast<Eigen::Index>(face.rows()), 3);
+  garment.face_panel = to_ids(face.integers("panel"));
+  garment.face_laminate = to_ids(face.integers("laminate"));
+  garment.face_columns = further_columns(face);
+
+  ply::Columns weld(document, name, "weld", issues);
+  const auto weld_a = weld.integers("a"), weld_b = weld.integers("b"), weld_seam = weld.integers("seam");
+  for (std::size_t i = 0; i < weld.rows(); ++i) garment.welds.push_back({weld_a[i], weld_b[i], weld_seam[i]});
+
+  ply::Columns fastener(document, name, "fastener", issues);
+  const auto fastener_a = fastener.integers("a"), fastener_b = fastener.integers("b"), kind = fastener.integers("kind");
+  const auto mass = fastener.reals("mass"), length = fastener.reals("length");
+  for (std::size_t i = 0; i < fastener.rows(); ++i) {
+    if (kind[i] < 0 || kind[i] > 2) issues.push_back({"bad_ply", {.file = name, .item = fmt::format("fastener {}", i)}, fmt::format("kind {} is not known", kind[i]), "make the file again"});
+    else garment.fasteners.push_back({fastener_a[i], fastener_b[i], static_cast<mesh::Fastener::Kind>(kind[i]), mass[i], length[i]});
+  }
+  ply::Columns run_vertex(document, name, "run_vertex", issues);
+  const auto run = run_vertex.integers("run"), id = run_vertex.integers("vertex");
+  const auto s = run_vertex.reals("s");
+  for (std::size_t i = 0; i < run_vertex.rows(); ++i) garment.run_vertices.push_back({run[i], id[i], s[i]});
+
+  if (issues.empty()) issues = mesh::validate(garment);
+  for (Issue& issue : issues) issue.place.file = name;
+  if (!issues.empty()) return issues;
+  return garment;
+}
+
+Result<mesh::GarmentMesh> read_garment(const std::string& path) {
+  TOILE_TRY(const std::string bytes, read_file(path));
+  return parse_garment(bytes, path);
+}
+
+std::string format_garment(const mesh::GarmentMesh& g, Encoding encoding) {
+  Header header;
+  header.panels = g.panels;
+  header.runs = g.runs;
+  header.points = g.points;
+  header.fabrics = g.fabrics;
+  header.laminates = g.laminates;
+  header.seams = g.seams;
+  header.marks = g.marks;
+  header.route = g.route;
+  ply::Document document;
+  document.comments.push_back(garment_magic);
+  ply::add_metadata(document, block_yaml_si(*record_type<Header>(), &header));
+
+  ply::Element vertex{"vertex", static_cast<std::size_t>(g.x.rows()), {}};
+  const char* axes[] = {"x", "y", "z"};
+  for (int k = 0; k < 3; ++k) vertex.properties.push_back(ply::real_column(axes[k], column_of(g.x, k)));
+  for (int k = 0; k < 2; ++k) {
+    const Eigen::VectorXd column = g.uv.col(k);
+    vertex.properties.push_back(ply::real_column(k == 0 ? "u" : "v", {column.data(), column.data() + column.size()}));
+  }
+  vertex.properties.push_back(ply::integer_column("panel", ids_of(g.vertex_panel)));
+  for (const auto& [name, column] : g.vertex_columns) vertex.properties.push_back(to_property(name, column));
+  document.elements.push_back(std::move(vertex));
+
+  ply::Element face{"face", static_cast<std::size_t>(g.faces.rows()), {}};
+  ply::Property corners = ply::integer_column("vertex_indices", {g.faces.data(), g.faces.data() + g.faces.size()});
+  corners.list = true;
+  face.properties.push_back(std::move(corners));
+  face.properties.push_back(ply::integer_column("panel", ids_of(g.face_panel)));
+  face.properties.push_back(ply::integer_column("laminate", ids_of(g.face_laminate)));
+  for (const auto& [name, column] : g.face_columns) face.properties.push_back(to_property(name, column));
+  document.elements.push_back(std::move(face));
+
+  if (!g.fasteners.empty()) {
+    const auto& items = g.fasteners;
+    document.elements.push_back({"fastener", items.size(),
+                                 {ply::integer_column("a", gather(items, [](const auto& f) { return f.a; })), ply::integer_column("b", gather(items, [](const auto& f) { return f.b; })),
+                                  ply::integer_column("kind", gather(items, [](const auto& f) { return static_cast<int>(f.kind); })),
+                                  ply::real_column("mass", gather(items, [](const auto& f) { return f.mass; })), ply::real_column("length", gather(items, [](const auto& f) { return f.length; }))}});
+  }
+  if (!g.welds.empty()) {
+    const auto& items = g.welds;
+    document.elements.push_back({"weld", items.size(),
+                                 {ply::integer_column("a", gather(items, [](const auto& w) { return w.a; })), ply::integer_column("b", gather(items, [](const auto& w) { return w.b; })),
+                                  ply::integer_column("seam", gather(items, [](const auto& w) { return w.seam; }))}});
+  }
+  if (!g.run_vertices.empty()) {
+    const auto& items = g.run_vertices;
+    document.elements.push_back({"run_vertex", items.size(),
+                                 {ply::integer_column("run", gather(items, [](const auto& r) { return r.run; })), ply::integer_column("vertex", gather(items, [](const auto& r) { return r.vertex; })),
+                                  ply::real_column("s", gather(items, [](const auto& r) { return r.s; }))}});
+  }
+  return ply::format(document, encoding);
+}
+
+}  // namespace toile::io
