@@ -251,7 +251,7 @@ std::string flow_record(const RecordType& type, void* record, NumberStyle style)
   std::string text = "{";
   for (const Field& field : type.fields) {
     void* value = field.address(record);
-    if (field.type.kind == Kind::optional && field.type.size(value) == 0) continue;
+    if (field.local || (field.type.kind == Kind::optional && field.type.size(value) == 0)) continue;
     if (text.size() > 1) text += ", ";
     text += field.key + ": " + flow_value(field, field.type, value, style);
   }

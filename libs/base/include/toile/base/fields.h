@@ -71,12 +71,13 @@ struct FieldInfo {
   double max = std::numeric_limits<double>::infinity();
   const char* source = "";  ///< where a default comes from: an anchor of docs/bibliography.md or a sentence
   bool required = false;    ///< must be given in a file; has no meaningful default
+  bool local = false;       ///< concerns one run only (the path of a log): not part of provenance and hash
 };
 
 struct Field {
   std::string key, doc, unit, source;
   double min, max;
-  bool required;
+  bool required, local;
   ValueType type;
   std::function<void*(void*)> address;  ///< of the field inside the record
 };
@@ -184,7 +185,7 @@ struct Describer {
   RecordType record;
   template <class M>
   void operator()(M T::*member, FieldInfo info) {
-    record.fields.push_back(Field{info.key, info.doc, info.unit, info.source, info.min, info.max, info.required, value_type<M>(),
+    record.fields.push_back(Field{info.key, info.doc, info.unit, info.source, info.min, info.max, info.required, info.local, value_type<M>(),
                                   [member](void* p) -> void* { return &(static_cast<T*>(p)->*member); }});
   }
   /// check(const T&, Issues&): a condition between fields.

@@ -29,7 +29,7 @@ Result<T> read_record(std::string_view yaml, const std::string& file, Units unit
 /// Reads one value from text as it stands on a command line ("8 mm", "[1, 2]", "true") into a field.
 Issues read_field(std::string_view text, const Field& field, void* record);
 
-/// Canonical flow YAML on one line: all fields in declared order, SI numbers in shortest form.
+/// Canonical flow YAML on one line: all fields but local ones in declared order, SI numbers in shortest form.
 std::string flow_yaml(const RecordType& type, const void* record);
 template <class T>
 std::string flow_yaml(const T& record) {

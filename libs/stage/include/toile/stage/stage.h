@@ -15,7 +15,9 @@
 #include "toile/mesh/garment_mesh.h"
 #include "toile/mesh/support_mesh.h"
 
+#include <functional>
 #include <map>
+#include <memory>
 #include <string>
 #include <variant>
 #include <vector>
@@ -42,6 +44,7 @@ struct Description {
   std::string details;  ///< paragraphs for --help and the docs page
   std::vector<Port> inputs;
   FileKind output = FileKind::garment;
+  bool output_optional = false;  ///< without -o a text artefact goes to stdout
 };
 
 /// A stage's result. Garments and supports are validated and get their route card; a string is written as it is.
@@ -52,7 +55,7 @@ struct Output {
   struct SideFile {
     std::string path, bytes;
   };
-  std::vector<SideFile> side_files;  ///< written (atomically) after the main output
+  std::vector<SideFile> side_files;  ///< written (atomically) before the main output
 };
 
 /// The command line as a stage sees it: its inputs, and ways to speak.
@@ -68,6 +71,8 @@ class Run {
   Result<std::string> bytes(const std::string& port, std::size_t index = 0) const;
 
   const std::string& output_path() const { return output_path_; }
+  /// --json was given: a stage whose artefact is text for people writes JSON instead.
+  bool json() const { return json_; }
 
   /// One fact for the summary that is printed at the end (text, or JSON with --json), in order of the calls.
   void report(const std::string& key, double value, const std::string& unit = "");
@@ -91,6 +96,7 @@ class Run {
     std::string plain;      ///< for people
   };
   std::map<std::string, std::vector<std::string>> inputs_;
+  std::map<std::string, std::string> contents_;  ///< path -> bytes
   std::string output_path_;
   std::vector<Fact> facts_;
   Issues warnings_;
@@ -108,6 +114,13 @@ struct Entry {
 };
 
 int run_program(const Entry& entry, int argc, char** argv);
+
+/// Exit code of a set of issues: the most basic trouble wins (2, 3, 4, 5, 130); 0 for none.
+int exit_code(const Issues& issues);
+/// Issues as a JSON array (code, file, line, column, item, what, remedy, category).
+std::string issues_json(const Issues& issues);
+/// The stage's page in Markdown: what --docs prints and docs/stages/ holds.
+std::string docs_page(const Entry& entry);
 
 template <class Stage>
 Entry entry() {
