@@ -345,6 +345,17 @@ Result<Image> draw_picture(const PictureParams& params, const mesh::GarmentMesh*
         else surface.colors.push_back(g.face_laminate[f] >= 0 ? palette[static_cast<std::size_t>(g.face_laminate[f])] : unknown);
       }
     }
+    surface.vertex_lines.assign(static_cast<std::size_t>(g.vertex_count()), EdgeLine::none);
+    for (Eigen::Index f = 0; f < g.face_count(); ++f) {
+      for (int k = 0; k < 3; ++k) {
+        const EdgeLine line = lines[static_cast<std::size_t>(f)][static_cast<std::size_t>(k)];
+        if (line != EdgeLine::seam && line != EdgeLine::border) continue;
+        for (const int end : {g.faces(f, (k + 1) % 3), g.faces(f, (k + 2) % 3)}) {
+          EdgeLine& at = surface.vertex_lines[static_cast<std::size_t>(end)];
+          at = std::max(at, line);
+        }
+      }
+    }
     const Vector3d centre = 0.5 * (cloth_x.colwise().minCoeff() + cloth_x.colwise().maxCoeff()).transpose();
     std::vector<Vector3f> kept_colors;
     for (Eigen::Index f = 0; f < g.face_count(); ++f) {

@@ -173,9 +173,9 @@ class Tracer {
 
   /// What comes from the surroundings: a bright ceiling, a wall behind the camera, a floor that gives some back.
   Vector3f surroundings(const Vector3f& d) const {
-    const float sky = 0.60f + 0.40f * std::clamp(0.5f + 0.7f * d.y(), 0.0f, 1.0f);
+    const float sky = 0.46f + 0.42f * std::clamp(0.5f + 0.7f * d.y(), 0.0f, 1.0f);
     const float wall = 0.20f * std::max(0.0f, d.dot(toward_));
-    const float value = d.y() > 0 ? sky + wall : std::max(0.50f, 0.60f + 0.40f * (0.5f + 0.7f * d.y())) * 0.92f + 0.7f * wall;
+    const float value = d.y() > 0 ? sky + wall : std::max(0.38f, sky) * 0.92f + 0.7f * wall;
     return value * Vector3f(0.975f, 0.99f, 1.0f);
   }
 
@@ -242,7 +242,7 @@ class Tracer {
     else if (surface.colors_on_faces) s.albedo = surface.colors[hit.hit.primID];
     else s.albedo = w[0] * surface.colors[static_cast<std::size_t>(face[0])] + w[1] * surface.colors[static_cast<std::size_t>(face[1])] + w[2] * surface.colors[static_cast<std::size_t>(face[2])];
     if (back && s.kind == Kind::cloth && !s.data) s.albedo *= 0.72f;
-    if (!surface.lines.empty()) s.albedo *= line_factor(surface.lines[hit.hit.primID], v, w, double_area, scale);
+    if (!surface.lines.empty()) s.albedo *= line_factor(surface, hit.hit.primID, v, w, double_area, scale);
 
     const Vector3f p = w[0] * v[0] + w[1] * v[1] + w[2] * v[2];
     // Start of the shadow rays lifted onto the smooth surface that the normals stand for, so that the facets do not
@@ -261,17 +261,26 @@ class Tracer {
     return s;
   }
 
-  float line_factor(const std::array<EdgeLine, 3>& lines, const Vector3f* v, const float* w, float double_area, float scale) const {
+  float line_factor(const Surface& surface, unsigned face, const Vector3f* v, const float* w, float double_area, float scale) const {
+    const float to_pixels = 1 / (scale * line_unit_);
     float factor = 1;
-    for (int k = 0; k < 3; ++k) {
-      const EdgeLine line = lines[static_cast<std::size_t>(k)];
-      if (line == EdgeLine::none) continue;
-      const float length = (v[(k + 2) % 3] - v[(k + 1) % 3]).norm();
-      if (length <= 0) continue;
-      const float pixels = w[k] * double_area / length / scale / line_unit_;
+    const auto draw = [&](EdgeLine line, float distance) {
       const float half_width = line == EdgeLine::border ? 1.7f : line == EdgeLine::seam ? 0.85f : 0.45f;
       const float depth = line == EdgeLine::border ? 0.55f : line == EdgeLine::seam ? 0.45f : 0.30f;
-      if (pixels < half_width) factor = std::min(factor, 1 - depth);
+      if (distance * to_pixels < half_width) factor = std::min(factor, 1 - depth);
+    };
+    const Vector3f p = w[0] * v[0] + w[1] * v[1] + w[2] * v[2];
+    for (int k = 0; k < 3; ++k) {
+      const auto corner = static_cast<std::size_t>(k);
+      // Faces that only touch a line with a corner share its width there.
+      if (!surface.vertex_lines.empty()) {
+        const EdgeLine line = surface.vertex_lines[static_cast<std::size_t>(surface.faces[face][corner])];
+        if (line != EdgeLine::none) draw(line, (p - v[k]).norm());
+      }
+      const EdgeLine line = surface.lines[face][corner];
+      if (line == EdgeLine::none) continue;
+      const float length = (v[(k + 2) % 3] - v[(k + 1) % 3]).norm();
+      if (length > 0) draw(line, w[k] * double_area / length);
     }
     return factor;
   }
@@ -313,7 +322,7 @@ class Tracer {
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     rtcOccluded8(valid, embree_, &context, &rays);
-    const Vector3f key_color(0.56f, 0.55f, 0.53f);
+    const Vector3f key_color(0.80f, 0.785f, 0.76f);
     Vector3f seen = Vector3f::Zero(), open = Vector3f::Zero();
     for (int k = 0; k < packet; ++k) {
       const bool free = rays.tfar[k] > 0;

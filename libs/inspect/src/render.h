@@ -21,6 +21,7 @@ struct Surface {
   bool colors_on_faces = false;
   bool data_colors = false;             ///< colours carry values: shaded less, so that they can be compared with the legend
   std::vector<std::array<EdgeLine, 3>> lines;  ///< per face, edge k opposite vertex k; may be empty
+  std::vector<EdgeLine> vertex_lines;          ///< the strongest seam or border line at each vertex; may be empty
 };
 
 /// A pinhole far away. A point of the picture plane through `target` has coordinates (X right, Y up) [m].

@@ -32,7 +32,7 @@ struct PictureParams {
   std::string size = "900x1200";
   int samples = 4;
   std::array<double, 3> background{0.945, 0.945, 0.94};
-  std::array<double, 3> support_color{0.80, 0.71, 0.62};
+  std::array<double, 3> support_color{0.77, 0.71, 0.65};
   static void describe(auto& f) {
     f(&PictureParams::view, {.key = "view", .doc = "where the camera stands; side is left (the wearer's); inside leaves out the near half of the cloth and the support; flat lays the panels out as cut"});
     f(&PictureParams::azimuth, {.key = "azimuth", .doc = "camera's turn about the vertical instead of the view's: 0 in front, 90 deg at the wearer's left", .unit = "rad", .min = -7, .max = 7});
