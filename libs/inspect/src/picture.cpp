@@ -297,7 +297,9 @@ Result<Image> draw_picture(const PictureParams& params, const mesh::GarmentMesh*
   if (!size) return size.issues();
   const bool flat = params.view == View::flat, inside = params.view == View::inside;
   if (flat && garment == nullptr) return Issue{"bad_view", {.item = "view"}, "the flat view shows panels, and no garment is given", "choose another view", Category::input};
-  if (flat || inside || (params.support == Shown::no && garment != nullptr)) support = nullptr;
+  const mesh::SupportMesh* measured_from = support;  // ease needs it even where it is not drawn
+  if (flat || inside || (params.show == Show::garment && garment != nullptr)) support = nullptr;
+  if (params.show == Show::support && support != nullptr) garment = nullptr;
 
   RenderScene scene;
   scene.width = (*size)[0];
@@ -323,7 +325,7 @@ Result<Image> draw_picture(const PictureParams& params, const mesh::GarmentMesh*
     surface.kind = Surface::Kind::cloth;
     const auto lines = edge_lines(g, params.lines);
     if (params.color != "plain" && params.color != "panel") {
-      auto found = color_field(params.color, g, support);
+      auto found = color_field(params.color, g, measured_from);
       if (!found) return found.issues();
       field = std::move(*found);
       if (field->place == ColorField::Place::faces && params.smoothing == Smoothing::vertices) {

@@ -16,7 +16,7 @@ enum class View { front, back, left, right, side, three_quarter, top, inside, fl
 enum class Frame { all, garment, support };
 enum class Lines { seams, mesh, none };
 enum class Smoothing { vertices, faces };
-enum class Shown { yes, no };
+enum class Show { all, garment, support };
 
 struct PictureParams {
   View view = View::front;
@@ -26,7 +26,7 @@ struct PictureParams {
   std::optional<std::array<double, 2>> range;
   Smoothing smoothing = Smoothing::vertices;
   Lines lines = Lines::seams;
-  Shown support = Shown::yes;
+  Show show = Show::all;
   Frame frame = Frame::all;
   double zoom = 1;
   std::string size = "900x1200";
@@ -37,11 +37,11 @@ struct PictureParams {
     f(&PictureParams::view, {.key = "view", .doc = "where the camera stands; side is left (the wearer's); inside leaves out the near half of the cloth and the support; flat lays the panels out as cut"});
     f(&PictureParams::azimuth, {.key = "azimuth", .doc = "camera's turn about the vertical instead of the view's: 0 in front, 90 deg at the wearer's left", .unit = "rad", .min = -7, .max = 7});
     f(&PictureParams::elevation, {.key = "elevation", .doc = "camera's height as an angle instead of the view's", .unit = "rad", .min = -1.56, .max = 1.56});
-    f(&PictureParams::color, {.key = "color", .doc = "plain, panel, strain_warp, strain_weft, shear, strain_bias, tension_warp, tension_weft, ease, or the name of a vertex or face column of the garment"});
+    f(&PictureParams::color, {.key = "color", .doc = "plain, panel, strain_warp, strain_weft, shear, strain_bias, tension_warp, tension_weft, or the name of a vertex or face column of the garment"});
     f(&PictureParams::range, {.key = "range", .doc = "values at the two ends of the colour scale, in the unit that the legend shows; otherwise taken from the data"});
     f(&PictureParams::smoothing, {.key = "smoothing", .doc = "colours of faces averaged to vertices inside a panel, or as they are"});
     f(&PictureParams::lines, {.key = "lines", .doc = "which lines are drawn: seams and free edges, the whole mesh too, or none"});
-    f(&PictureParams::support, {.key = "support", .doc = "whether the support is shown"});
+    f(&PictureParams::show, {.key = "show", .doc = "what is drawn of the files given"});
     f(&PictureParams::frame, {.key = "frame", .doc = "what the picture is filled with"});
     f(&PictureParams::zoom, {.key = "zoom", .doc = "enlargement about the middle of the frame", .unit = "1", .min = 0.05, .max = 100});
     f(&PictureParams::size, {.key = "size", .doc = "WIDTHxHEIGHT in pixels"});
@@ -96,7 +96,7 @@ struct toile::Choices<toile::inspect::Smoothing> {
   static constexpr std::array names{std::pair{"vertices", V::vertices}, std::pair{"faces", V::faces}};
 };
 template <>
-struct toile::Choices<toile::inspect::Shown> {
-  using V = toile::inspect::Shown;
-  static constexpr std::array names{std::pair{"yes", V::yes}, std::pair{"no", V::no}};
+struct toile::Choices<toile::inspect::Show> {
+  using V = toile::inspect::Show;
+  static constexpr std::array names{std::pair{"all", V::all}, std::pair{"garment", V::garment}, std::pair{"support", V::support}};
 };

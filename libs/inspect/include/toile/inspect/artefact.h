@@ -1,0 +1,12 @@
+#pragma once
+
+#include <string_view>
+
+namespace toile::inspect {
+
+enum class Artefact { garment, support, other };
+
+/// What a file is, from its first lines.
+Artefact artefact_kind(std::string_view bytes);
+
+}  // namespace toile::inspect
