@@ -96,7 +96,7 @@ struct Pattern {
 /// Everything that is wrong with a pattern, at once. Issue places name `piece.edge`; positions are in pattern units.
 ///   no_pieces, empty_outline, duplicate_name, bad_name, unknown_point, open_outline, edge_off_point, zero_length_edge,
 ///   zero_length_line, broken_edge, self_crossing, hole_outside, line_outside, mark_outside, unknown_edge, bad_notch,
-///   notch_off_border, fold_not_straight, piece_across_fold, grain_missing, grain_zero, bad_copies
+///   notch_off_border, fold_not_straight, piece_across_fold, grain_missing, grain_zero, bad_copies, no_area
 Issues check(const Pattern& pattern);
 
 /// Where to split an edge: at a named point of the piece, at a position, or at a distance from the edge's first point
@@ -138,8 +138,12 @@ struct PanelLine {
 };
 
 struct PanelPoint {
+  enum class Where { border, inside, outside };
   std::string name;
   Point2 at = Point2::Zero();
+  Where where = Where::inside;  ///< border: within 1e-6 m of an edge; outside: a drafting point off the cloth
+  std::string edge;             ///< on the border: the edge it lies on (at a corner the one that starts there)
+  double s = 0;                 ///< on the border: along that edge
 };
 
 struct PanelNotch {
@@ -173,9 +177,13 @@ struct CutPanel {
   double perimeter = 0;  ///< of the outline [m]
 };
 
+/// Name of the copy-th panel cut from a piece (from 0): `sleeve`, `sleeve_m`, `sleeve_2`, ...
+std::string panel_name(const Piece& piece, int copy);
+
 /// The panels of a pattern, in the order of its pieces and copies. A piece on the fold becomes one panel: the fold edge
-/// vanishes, everything of the other half has the suffix `_m`, points on the fold stay single. A mirrored copy keeps
-/// its edge names. Edges of mirrored halves and copies run the other way, as do those of an outline drawn clockwise.
+/// vanishes, everything of the other half has the suffix `_m`, what lies on the fold stays single; its copies are all
+/// alike. A mirrored copy keeps its edge names. Edges of mirrored halves and copies run the other way, as do those of an
+/// outline drawn clockwise. v runs from `grain.from` to `grain.to`, or up the drawing where the fold is the grain.
 /// error  all issues of check()
 Result<std::vector<CutPanel>> cut_panels(const Pattern& pattern);
 
