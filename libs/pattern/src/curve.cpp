@@ -1,5 +1,6 @@
 #include "toile/pattern/curve.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>

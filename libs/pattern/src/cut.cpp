@@ -1,5 +1,6 @@
 #include "geometry.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 

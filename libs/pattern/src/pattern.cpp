@@ -58,6 +58,7 @@ Result<Piece> split_edge(const Piece& source, LengthUnit units, const std::strin
     }
   }
   if (edge.segments.empty()) return issue("broken_edge", "it has no segments", "give it at least one line or curve");
+  if (piece.fold == edge_name) return issue("split_fold", "it lies on the fold, which is one straight edge", "name a point on it instead");
 
   const Curve curve(edge.segments);
   const double scale = in_metres(units);
@@ -106,7 +107,6 @@ Result<Piece> split_edge(const Piece& source, LengthUnit units, const std::strin
     notch.fraction.reset();
     notch.distance = here <= s ? here : here - s;
   }
-  if (piece.fold == edge_name) piece.fold = first;
   *edge_at = std::move(a);
   loop->insert(edge_at + 1, std::move(b));
   return piece;

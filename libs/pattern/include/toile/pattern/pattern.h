@@ -113,7 +113,7 @@ inline constexpr double on_edge_tolerance = 1e-4;
 /// Cuts one edge of the outline or of a hole into two, named `first` and `second`, in the edge's direction. The point
 /// of the split is moved onto the curve. Notches follow their half.
 /// tolerance  largest distance of the point from the edge [m]
-/// error      Issue "unknown_edge", "unknown_point", "point_off_edge", "split_at_end", "duplicate_name"
+/// error      Issue "unknown_edge", "unknown_point", "point_off_edge", "split_at_end", "split_fold", "duplicate_name"
 Result<Piece> split_edge(const Piece& piece, LengthUnit units, const std::string& edge, const SplitAt& at, const std::string& first,
                          const std::string& second, double tolerance = on_edge_tolerance);
 
