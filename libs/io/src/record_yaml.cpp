@@ -129,6 +129,11 @@ class Reader {
         for (std::size_t i = 0; i < node.size(); ++i) read_number(node[i], field, type, static_cast<double*>(value) + i, fmt::format("{}[{}]", path, i));
         return;
       case Kind::list:
+        if (node.IsScalar() && type.element->kind == Kind::text) {
+          // One word stands for a list of one: `in: {fabrics: card}`.
+          type.clear(value);
+          return read_value(node, field, *type.element, type.append(value), path);
+        }
         if (!node.IsSequence()) return wrong_type(node, type, path);
         type.clear(value);
         for (std::size_t i = 0; i < node.size(); ++i) read_value(node[i], field, *type.element, type.append(value), fmt::format("{}[{}]", path, i));

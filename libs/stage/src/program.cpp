@@ -22,6 +22,7 @@ const CommonOption common_options[] = {
     {"--ascii", "write garments and supports as text instead of binary"},
     {"--quiet", "no progress and no summary"},
     {"--schema", "print the JSON schema of the spec and stop"},
+    {"--describe", "print inputs and output as JSON, for pipelines, and stop"},
     {"--docs", "print the documentation page (Markdown) and stop"},
     {"--version", "print the version and stop"},
 };
@@ -95,7 +96,7 @@ class Program {
  private:
   struct Options {
     std::string output, spec;
-    bool dump_spec = false, check = false, json = false, ascii = false, quiet = false, schema = false, docs = false, version = false;
+    bool dump_spec = false, check = false, json = false, ascii = false, quiet = false, schema = false, docs = false, describe = false, version = false;
     int threads = 0;
     std::vector<std::string> positional;
     std::map<std::string, std::vector<std::string>> ports;
@@ -125,6 +126,7 @@ class Program {
     app.add_flag("--quiet", options.quiet);
     app.add_flag("--schema", options.schema);
     app.add_flag("--docs", options.docs);
+    app.add_flag("--describe", options.describe);
     app.add_flag("--version", options.version);
     app.add_option("--threads", options.threads)->check(CLI::Range(0, 1024));
     for (const Port& port : entry_.description.inputs) {
@@ -167,6 +169,15 @@ class Program {
     }
     if (!issues.empty()) return fail(issues, options.json);
     return std::nullopt;
+  }
+
+  void print_description() {
+    std::string ports;
+    for (const Port& port : entry_.description.inputs) {
+      ports += fmt::format("{}{{\"name\": \"{}\", \"required\": {}, \"many\": {}}}", ports.empty() ? "" : ", ", port.name, port.required, port.many);
+    }
+    fmt::print("{{\"name\": \"{}\", \"version\": {}, \"output\": \"{}\", \"inputs\": [{}]}}\n", entry_.description.name, entry_.description.version,
+               extension(entry_.description.output), ports);
   }
 
   void print_help() {
@@ -225,8 +236,9 @@ class Program {
       return 0;
     }
     const std::shared_ptr<void> params = entry_.make_params();
-    if (options.dump_spec || options.schema || options.docs) {
-      if (options.dump_spec) fmt::print("# {}: {}\n{}", description.name, description.summary, io::commented_yaml(*entry_.params, params.get()));
+    if (options.dump_spec || options.schema || options.docs || options.describe) {
+      if (options.describe) print_description();
+      else if (options.dump_spec) fmt::print("# {}: {}\n{}", description.name, description.summary, io::commented_yaml(*entry_.params, params.get()));
       else if (options.schema) fmt::print("{}", io::json_schema(*entry_.params, description.name));
       else fmt::print("{}", docs_page(entry_));
       return 0;

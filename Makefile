@@ -1,0 +1,44 @@
+# The front door. `make help` lists what there is; CMake does the work in build/release.
+.DEFAULT_GOAL := help
+.PHONY: help deps configure tools tee skirt test bench docs asan ubsan clean
+BUILD := build/release
+JOBS ?= $(shell nproc)
+
+help:
+	@echo 'make tee      install what is missing, build, and make a T-shirt: pattern -> garment at rest on a dress form'
+	@echo 'make skirt    the same for a skirt with darts'
+	@echo 'make test     build and run all tests'
+	@echo 'make bench    time the tee stage by stage, and reading and writing of large garments'
+	@echo 'make docs     write docs/stages/ from the programs'
+	@echo 'make asan, make ubsan   the tests under AddressSanitizer or UndefinedBehaviorSanitizer'
+	@echo 'make clean    remove build/'
+
+deps:
+	@scripts/install-deps.sh
+
+configure: deps
+	@test -f $(BUILD)/build.ninja || cmake --preset release
+
+tools: configure
+	@cmake --build $(BUILD) --target tools -j $(JOBS)
+
+tee skirt: tools
+	@$(BUILD)/bin/toile run pipelines/$@/pipeline.yaml --build build/garments -j $(JOBS)
+
+test: configure
+	@cmake --build $(BUILD) -j $(JOBS)
+	@ctest --test-dir $(BUILD) --output-on-failure -j $(JOBS)
+
+bench: tools
+	@scripts/bench.sh $(BUILD) build/bench
+
+docs: tools
+	@scripts/generate-docs.sh $(BUILD)/bin docs/stages
+
+asan ubsan: deps
+	@cmake --preset $@
+	@cmake --build build/$@ -j $(JOBS)
+	@ctest --test-dir build/$@ --output-on-failure -j $(JOBS)
+
+clean:
+	rm -rf build
