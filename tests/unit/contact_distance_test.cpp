@@ -123,12 +123,15 @@ void check_approach(std::uint64_t seed) {
   int impacts = 0, free = 0, crossings = 0;
   for (int kind = 0; kind < 9; ++kind) {
     SCOPED_TRACE("configuration " + std::to_string(kind));
-    for (int i = 0; i < 4000; ++i) {
+    for (int i = 0; i < 6000; ++i) {
       const auto x = configuration(rng, kind);
       std::array<Vec, 4> u;
       const int motion = static_cast<int>(rng.below(4));
       const Vec common = random_vec(rng, 0.02);
       for (Vec& d : u) d = motion == 0 ? random_vec(rng, 0.01) : Vec(common * (motion == 1) + random_vec(rng, motion == 3 ? 1e-5 : 0.004));
+      if (motion == 2) {  // on a course towards each other
+        for (int k = 0; k < (type == PairType::vertex_face ? 1 : 2); ++k) u[k] += rng.uniform(0.5, 2) * (x[2] + x[3] - x[0] - x[1]) * 0.5;
+      }
       const double separation = rng.uniform() < 0.5 ? 5e-5 : 1e-6;
       const Approach a = approach<type>(x, u, separation);
       const double start = std::sqrt(closest<type>(x).distance_sq);
@@ -163,7 +166,7 @@ void check_approach(std::uint64_t seed) {
   }
   EXPECT_GT(impacts, 500);
   EXPECT_GT(free, 5000);
-  EXPECT_GT(crossings, 200);
+  EXPECT_GT(crossings, 100);
 }
 
 TEST(ContactApproach, VertexFaceAgainstDenseSampling) { check_approach<PairType::vertex_face>(2); }

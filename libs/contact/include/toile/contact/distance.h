@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <array>
@@ -124,8 +125,12 @@ inline Closest closest(const std::array<Vec, 4>& x) {
   }
 }
 
-/// Smallest distance that a pair may come to when it starts at `distance`: `separation`, or half of what there is.
-inline double separation_floor(double distance, double separation) { return std::min(separation, 0.5 * distance); }
+/// Smallest distance that a pair may come to when it starts at `distance`: `separation`; half of what there is when it
+/// starts within twice that; and from a fiftieth of the separation on nothing but the last 1e-12 m, so that no number of
+/// steps wears the distance down to rounding.
+inline double separation_floor(double distance, double separation) {
+  return std::min(separation, std::max(0.5 * distance, std::min(separation / 50, distance - 1e-12)));
+}
 
 /// Distances below this count as touching: no motion can be called safe [m].
 inline constexpr double touching_distance = 1e-9;
@@ -139,8 +144,8 @@ struct Approach {
 /// Conservative time up to which two primitives moving along straight ways stay apart by
 /// separation_floor(distance(x), separation). Advances by the larger of two safe steps: gap over relative speed with the
 /// mean motion taken out (additive advancement, Li et al. 2021) and the time until the slab between the closest points,
-/// normal to their connection, is used up. A motion that never comes nearer than 1.1 times the floor has no impact, unless it takes more
-/// than 200 steps to see that.
+/// normal to their connection, is used up. A motion that never comes nearer than 1.1
+/// times the floor has no impact, unless it takes more than 200 steps to see that.
 /// x, u    positions [m] and displacements [m]
 /// Source: docs/bibliography.md#li2021
 template <PairType type>

@@ -54,7 +54,7 @@ struct Radii {
 
 struct LimitOptions {
   /// Pairs that start at twice this distance or more never come nearer than it [m]; pairs that start nearer lose at most
-  /// half of their distance. Must be well above rounding: at least 1e-7 m for garments.
+  /// half of their distance, and nothing (1e-12 m) below a fiftieth of it. Must be well above rounding: at least 1e-6 m.
   double self_separation = 5e-5;
   double support_separation = 5e-5;
   double rewind = 0.9;  ///< nodes of an impact keep this part of the time of impact, in (0, 1)
