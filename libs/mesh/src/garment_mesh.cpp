@@ -6,6 +6,7 @@
 #include "toile/mesh/support_mesh.h"
 #include "toile/mesh/topology.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <numeric>
 #include <set>

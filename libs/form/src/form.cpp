@@ -1,0 +1,192 @@
+#include "toile/form/form.h"
+
+#include "gauge.h"
+#include "shape.h"
+#include "surface_mesher.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace toile::form {
+
+using Eigen::Vector3d;
+
+namespace {
+
+struct Target {
+  const char* name;
+  bool girth;
+  double requested;
+};
+
+std::vector<Target> targets(const Measurements& m, const FormParams& params) {
+  std::vector<Target> t = {
+      {"neck", true, m.neck}, {"chest", true, m.chest}, {"waist", true, m.waist}, {"hips", true, m.hips}, {"seat", true, m.seat},
+      {"shoulderToShoulder", false, m.shoulderToShoulder}, {"shoulderSlope", false, m.shoulderSlope},
+      {"hpsToWaistBack", false, m.hpsToWaistBack}, {"hpsToBust", false, m.hpsToBust}, {"waistToArmpit", false, m.waistToArmpit},
+      {"waistToHips", false, m.waistToHips}, {"waistToSeat", false, m.waistToSeat}, {"waistToFloor", false, m.waistToFloor}};
+  if (params.arms) {
+    t.insert(t.begin() + 5, {{"biceps", true, m.biceps}, {"wrist", true, m.wrist}});
+    t.push_back({"shoulderToElbow", false, m.shoulderToElbow});
+    t.push_back({"shoulderToWrist", false, m.shoulderToWrist});
+  }
+  if (params.sex == Sex::female && m.underbust) t.insert(t.begin() + 2, {"underbust", true, *m.underbust});
+  return t;
+}
+
+/// One round of fitting: every measure corrects the quantity it depends on most.
+Tuning corrected(Tuning t, const Measurements& m, const FormParams& params, const Gauge& g) {
+  const auto value = [&](const char* name) {
+    const auto it = g.values.find(name);
+    return it == g.values.end() ? 0.0 : it->second;
+  };
+  const auto scale = [&](double& factor, const char* name, double requested) {
+    const double measured = value(name);
+    if (measured > 0) factor = std::clamp(factor * std::clamp(requested / measured, 0.85, 1.18), 0.5, 2.0);
+  };
+  const auto shift = [&](double& length, const char* name, double requested, double share, double step) {
+    const double measured = value(name);
+    if (measured > 0) length += std::clamp(share * (requested - measured), -step, step);
+  };
+  const double u = 0.5 * (m.chest + m.hpsToWaistBack / 0.46);
+  scale(t.neck, "neck", m.neck);
+  scale(t.chest, "chest", m.chest);
+  scale(t.waist, "waist", m.waist);
+  scale(t.hips, "hips", m.hips);
+  scale(t.seat, "seat", m.seat);
+  if (params.sex == Sex::female && m.underbust) scale(t.underbust, "underbust", *m.underbust);
+  shift(t.hps_height, "hpsToWaistBack", m.hpsToWaistBack, 0.9, 0.03 * u);
+  shift(t.slope, "shoulderSlope", m.shoulderSlope, 0.8, 0.08);
+  t.slope = std::clamp(t.slope, 0.03, 0.9);
+  shift(t.bust_height, "hpsToBust", m.hpsToBust, -0.9, 0.03 * u);
+  if (params.arms) {
+    scale(t.biceps, "biceps", m.biceps);
+    scale(t.wrist, "wrist", m.wrist);
+    shift(t.arm_root, "waistToArmpit", m.waistToArmpit, -0.7, 0.012 * u);
+    t.arm_root = std::clamp(t.arm_root, -0.06 * u, 0.12 * u);
+    shift(t.elbow, "shoulderToElbow", m.shoulderToElbow, 1.0, 0.03 * u);
+    shift(t.hand, "shoulderToWrist", m.shoulderToWrist, 1.0, 0.05 * u);
+  }
+  return t;
+}
+
+double misfit(const Gauge& g, const std::vector<Target>& wanted) {
+  double worst = 0;
+  for (const Target& t : wanted) {
+    const auto it = g.values.find(t.name);
+    if (it == g.values.end()) return 1;
+    const double scale = std::string(t.name) == "shoulderSlope" ? 0.15 : 1;
+    worst = std::max(worst, scale * std::abs(it->second - t.requested) / (t.girth ? 1 : 2.5));
+  }
+  return worst;
+}
+
+enum Region { torso, neck, arm_left, arm_right };
+
+int region(const Vector3d& p, const Levels& l, const FormParams& params) {
+  if ((p - l.neck_point).dot(l.neck_normal) > 0 && std::abs(p.x()) < 0.6 * l.half_shoulder) return neck;
+  if (!params.arms) return torso;
+  // The armhole: a plane through the shoulder tip and the armpit.
+  const Vector3d q(std::abs(p.x()), p.y(), p.z());
+  const Vector3d tip(l.half_shoulder, l.shoulder, 0), pit(l.half_shoulder - 0.035 * l.unit, l.armpit, 0);
+  const Vector3d down = pit - tip, out = Vector3d(-down.y(), down.x(), 0).normalized();
+  if ((q - tip).dot(out) <= 0 || (q.y() < l.waist && q.x() < l.half_shoulder)) return torso;
+  return p.x() > 0 ? arm_left : arm_right;
+}
+
+double smallest_angle(const mesh::Points3& x, const mesh::Triangles& faces) {
+  double least = 4;
+  for (Eigen::Index f = 0; f < faces.rows(); ++f) {
+    for (int k = 0; k < 3; ++k) {
+      const Vector3d a = x.row(faces(f, k)), b = x.row(faces(f, (k + 1) % 3)), c = x.row(faces(f, (k + 2) % 3));
+      least = std::min(least, std::atan2((b - a).cross(c - a).norm(), (b - a).dot(c - a)));
+    }
+  }
+  return least;
+}
+
+}  // namespace
+
+Result<Form> make_form(const Measurements& m, const FormParams& params) {
+  Issues issues = validate(m);
+  append(issues, validate(params));
+  if (!issues.empty()) return issues;
+
+  const std::vector<Target> wanted = targets(m, params);
+  Tuning tuning = first_tuning(m, params);
+  Form form;
+
+  // First on rough meshes, cheap to make anew in every round.
+  for (int round = 0; round < 10; ++round) {
+    const Shape shape(m, params, tuning);
+    const Field field = [&](const Vector3d& p) { return shape(p); };
+    const HalfSurface rough = polygonise(field, shape.low(), shape.high(), 0.022 * shape.levels().unit);
+    const Whole whole = mirrored(rough);
+    Gauge gauge = measure(whole.x, whole.faces, shape.levels(), params);
+    ++form.iterations;
+    if (misfit(gauge, wanted) < 0.006) break;
+    tuning = corrected(tuning, m, params, gauge);
+  }
+
+  // Then the mesh itself: wanted size by wanted number of vertices.
+  const Shape shape(m, params, tuning);
+  const Field field = [&](const Vector3d& p) { return shape(p); };
+  const double u = shape.levels().unit;
+  HalfSurface start = polygonise(field, shape.low(), shape.high(), 0.022 * u);
+  double edge = 0.0165 * u * std::sqrt(6000.0 / params.vertices);
+  HalfSurface half;
+  for (int attempt = 0; attempt < 5; ++attempt) {
+    const Sizing sizing = [&](const Vector3d& p) { return edge * shape.sizing(p); };
+    half = remesh(attempt == 0 ? start : half, field, sizing, attempt == 0 ? 8 : 4);
+    const double ratio = static_cast<double>(mirrored_vertex_count(half)) / params.vertices;
+    if (std::abs(ratio - 1) < 0.025) break;
+    edge *= std::sqrt(ratio);
+  }
+
+  // Last, the same triangles follow the shape while the measures are brought home on the mesh as it will be delivered.
+  Whole whole;
+  Gauge gauge;
+  Levels levels;
+  for (int round = 0; round < 15; ++round) {
+    const Shape now(m, params, tuning);
+    const Field here = [&](const Vector3d& p) { return now(p); };
+    const Sizing sizing = [&](const Vector3d& p) { return edge * now.sizing(p); };
+    half = follow(std::move(half), here, sizing, 2);
+    whole = mirrored(half);
+    levels = now.levels();
+    gauge = measure(whole.x, whole.faces, levels, params);
+    ++form.iterations;
+    if (misfit(gauge, wanted) < 3e-4) break;
+    tuning = corrected(tuning, m, params, gauge);
+  }
+
+  form.mesh.x = whole.x;
+  form.mesh.faces = whole.faces;
+  form.mesh.landmarks = gauge.landmarks;
+  form.mesh.region_names = {"torso", "neck"};
+  if (params.arms) form.mesh.region_names.insert(form.mesh.region_names.end(), {"arm_left", "arm_right"});
+  form.mesh.face_region.resize(whole.faces.rows());
+  for (Eigen::Index f = 0; f < whole.faces.rows(); ++f) {
+    const Vector3d centre = (whole.x.row(whole.faces(f, 0)) + whole.x.row(whole.faces(f, 1)) + whole.x.row(whole.faces(f, 2))).transpose() / 3;
+    form.mesh.face_region[f] = region(centre, levels, params);
+  }
+  for (const Target& t : wanted) {
+    const auto it = gauge.values.find(t.name);
+    const double measured = it == gauge.values.end() ? 0 : it->second;
+    GaugeRow row{t.name, t.girth, t.requested, measured, measured - t.requested, t.girth ? params.girth_tolerance : params.length_tolerance};
+    if (row.name == "shoulderSlope") {
+      const auto& hps = gauge.landmarks.at("hps_left");
+      row.difference = (levels.half_shoulder - hps[0]) * (std::tan(measured) - std::tan(t.requested));
+    }
+    if (t.girth) form.mesh.girths[t.name] = measured;
+    form.gauge.push_back(row);
+  }
+  form.smallest_angle = smallest_angle(whole.x, whole.faces);
+  issues = mesh::validate(form.mesh);
+  if (!issues.empty()) return issues;
+  return form;
+}
+
+}  // namespace toile::form

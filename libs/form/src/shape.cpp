@@ -1,0 +1,331 @@
+#include "shape.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace toile::form {
+
+using Eigen::Vector3d;
+
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+/// Cubic smooth minimum: equal to the minimum where the two differ by more than k, C2 everywhere.
+double smooth_min(double a, double b, double k) {
+  const double h = std::max(k - std::abs(a - b), 0.0) / k;
+  return std::min(a, b) - h * h * h * k / 6;
+}
+double smooth_max(double a, double b, double k) { return -smooth_min(-a, -b, k); }
+
+/// Monotone piecewise cubic through knots (Fritsch and Carlson's choice of slopes).
+double monotone_cubic(const std::vector<std::pair<double, double>>& knots, double s) {
+  const std::size_t n = knots.size();
+  if (s <= knots.front().first) return knots.front().second;
+  if (s >= knots.back().first) return knots.back().second;
+  std::size_t i = 0;
+  while (s > knots[i + 1].first) ++i;
+  const auto secant = [&](std::size_t k) { return (knots[k + 1].second - knots[k].second) / (knots[k + 1].first - knots[k].first); };
+  const auto slope = [&](std::size_t k) {
+    if (k == 0 || k == n - 1) return 0.0;
+    const double a = secant(k - 1), b = secant(k);
+    if (a * b <= 0) return 0.0;
+    const double ha = knots[k].first - knots[k - 1].first, hb = knots[k + 1].first - knots[k].first;
+    const double wa = 2 * hb + ha, wb = hb + 2 * ha;
+    return (wa + wb) / (wa / a + wb / b);
+  };
+  const double h = knots[i + 1].first - knots[i].first, t = (s - knots[i].first) / h;
+  const double t2 = t * t, t3 = t2 * t;
+  return (2 * t3 - 3 * t2 + 1) * knots[i].second + (t3 - 2 * t2 + t) * h * slope(i) + (-2 * t3 + 3 * t2) * knots[i + 1].second +
+         (t3 - t2) * h * slope(i + 1);
+}
+
+/// 0 behind, 1 in front, smooth over about `width`.
+double frontness(double s, double width) { return 0.5 * (1 + s / std::sqrt(s * s + width * width)); }
+
+}  // namespace
+
+Profile::Profile(const std::vector<std::pair<double, double>>& knots, double round) {
+  step_ = round / 2.5;
+  low_ = knots.front().first - 4 * step_;
+  const int n = static_cast<int>(std::ceil((knots.back().first - low_) / step_)) + 5;
+  std::vector<double> raw;
+  const int reach = 8;
+  for (int i = -reach; i < n + reach; ++i) raw.push_back(monotone_cubic(knots, low_ + i * step_));
+  for (int i = 0; i < n; ++i) {
+    double sum = 0, weight = 0;
+    for (int j = -reach; j <= reach; ++j) {
+      const double w = std::exp(-0.5 * j * j / (2.5 * 2.5));
+      sum += w * raw[static_cast<std::size_t>(i + j + reach)];
+      weight += w;
+    }
+    values_.push_back(sum / weight);
+  }
+}
+
+Profile::Value Profile::at(double s) const {
+  const double u = std::clamp((s - low_) / step_, 0.0, static_cast<double>(values_.size() - 1));
+  const int last = static_cast<int>(values_.size()) - 1;
+  const int i = std::min(static_cast<int>(u), last - 1);
+  const double t = u - i;
+  const auto v = [&](int k) { return values_[static_cast<std::size_t>(std::clamp(k, 0, last))]; };
+  const double a = v(i - 1), b = v(i), c = v(i + 1), d = v(i + 2);
+  const double t2 = t * t, t3 = t2 * t;
+  const double f = ((1 - 3 * t + 3 * t2 - t3) * a + (4 - 6 * t2 + 3 * t3) * b + (1 + 3 * t + 3 * t2 - 3 * t3) * c + t3 * d) / 6;
+  const double g = ((-1 + 2 * t - t2) * a + (-4 * t + 3 * t2) * b + (1 + 2 * t - 3 * t2) * c + t2 * d) / 2;
+  return {f, g / step_};
+}
+
+Tuning first_tuning(const Measurements& m, const FormParams& params) {
+  Tuning t;
+  t.hps_height = 0.94 * m.hpsToWaistBack;
+  t.slope = m.shoulderSlope;
+  t.bust_height = t.hps_height - 0.95 * m.hpsToBust;
+  t.arm_root = 0.02 * m.hpsToWaistBack / 0.46;
+  t.elbow = m.shoulderToElbow - 0.02;
+  t.hand = m.shoulderToWrist - 0.02;
+  (void)params;
+  return t;
+}
+
+void Shape::bump(double x, double y, double z, double sx, double sy, double sz, double height) {
+  const double u = levels_.unit;
+  bumps_.push_back({{x * u, y, z}, {sx * u, sy * u, sz * u}, height * u});
+}
+
+Shape::Shape(const Measurements& m, const FormParams& params, const Tuning& tuning) : params_(params) {
+  const bool male = params.sex == Sex::male;
+  Levels& l = levels_;
+  const double u = l.unit = 0.5 * (m.chest / (male ? 1.0 : 0.92) + m.hpsToWaistBack / (male ? 0.46 : 0.42));
+
+  l.waist = m.waistToFloor;
+  l.hips = l.waist - m.waistToHips;
+  l.seat = l.waist - m.waistToSeat;
+  const double leg = m.waistToUpperLeg ? l.waist - *m.waistToUpperLeg : l.seat - 0.06 * u;
+  l.bottom = std::min(leg, l.seat - 0.05 * u) - 0.035 * u;
+  l.hps = l.waist + tuning.hps_height;
+  l.armpit = l.waist + m.waistToArmpit;
+  l.bust = l.waist + tuning.bust_height;
+  l.chest = std::min(l.bust, l.armpit - 0.02 * u);  // a tape round the chest passes under the arms
+  l.underbust = m.waistToUnderbust ? std::min(l.waist + *m.waistToUnderbust, l.chest - 0.045 * u) : l.waist + 0.55 * (l.chest - l.waist);
+  l.half_shoulder = m.shoulderToShoulder / 2;
+
+  const double neck = m.neck * tuning.neck;
+  const double neck_half = 0.147 * neck;
+  const double slope = std::tan(tuning.slope);
+  l.shoulder = l.hps - slope * (l.half_shoulder - neck_half);
+
+  // ---- sections along the spine ----
+  const double chest = m.chest * tuning.chest, waist = m.waist * tuning.waist, hips = m.hips * tuning.hips, seat = m.seat * tuning.seat;
+  const double ribs_asked = m.underbust.value_or(male ? 0.5 * (m.chest + m.waist) * 1.0 : 0.45 * m.waist + 0.55 * (m.chest - 0.06 * u));
+  const double ribs = ribs_asked * tuning.underbust;
+  // The rib cage under the breasts carries on from the underbust; without breasts it is the chest itself.
+  const double cage = male ? chest : std::min(0.97 * m.chest, 1.06 * ribs_asked);
+  const double belly = std::clamp((m.waist / m.chest - (male ? 0.8 : 0.76)) * 0.14, -0.01, 0.05);
+  // With arms the torso ends inside the shoulder; without them it makes the shoulder itself.
+  const double tip = l.half_shoulder + (params.arms ? -0.004 * u : 0.018 * u);
+  const double axilla = l.shoulder - 0.062 * u;
+  const double under_seat = l.seat - 0.055 * u;
+
+  struct Level {
+    double y, width, front, back, centre, front_power, back_power;
+  };
+  std::vector<Level> levels;
+  if (male) {
+    levels = {
+        {l.bottom - 0.03 * u, 0.186 * seat, 0.088 * seat, 0.088 * seat, 0.026 * u, 2.3, 2.3},
+        {under_seat, 0.189 * seat, 0.094 * seat, 0.104 * seat, 0.024 * u, 2.3, 2.3},
+        {l.seat, 0.190 * seat, 0.098 * seat, 0.121 * seat, 0.023 * u, 2.3, 2.35},
+        {l.hips, 0.180 * hips, 0.112 * hips, 0.126 * hips, 0.028 * u, 2.35, 2.35},
+        {l.waist, 0.181 * waist, (0.122 + belly) * waist, (0.120 - 0.4 * belly) * waist, 0.038 * u, 2.3, 2.3},
+        {l.underbust, 0.176 * ribs, 0.121 * ribs, 0.125 * ribs, 0.037 * u, 2.35, 2.3},
+        {l.chest, 0.176 * chest, 0.117 * chest, 0.117 * chest, 0.030 * u, 2.5, 2.5},
+        {axilla, tip - 0.016 * u, 0.098 * chest, 0.108 * chest, 0.020 * u, 2.4, 2.7},
+        {l.shoulder, tip, 0.066 * chest, 0.088 * chest, 0.014 * u, 2.2, 2.4},
+        {l.hps + 0.004 * u, tip + 0.03 * u, 0.150 * neck, 0.150 * neck, 0.022 * u, 2.05, 2.0},
+        {l.hps + 0.045 * u, tip + 0.03 * u, 0.158 * neck, 0.150 * neck, 0.036 * u, 2.0, 2.0},
+        {l.hps + 0.13 * u, tip + 0.03 * u, 0.158 * neck, 0.154 * neck, 0.064 * u, 2.0, 2.0},
+    };
+  } else {
+    levels = {
+        {l.bottom - 0.03 * u, 0.190 * seat, 0.086 * seat, 0.084 * seat, 0.020 * u, 2.25, 2.25},
+        {under_seat, 0.193 * seat, 0.090 * seat, 0.104 * seat, 0.018 * u, 2.25, 2.25},
+        {l.seat, 0.193 * seat, 0.096 * seat, 0.122 * seat, 0.016 * u, 2.25, 2.3},
+        {l.hips, 0.186 * hips, 0.110 * hips, 0.124 * hips, 0.022 * u, 2.25, 2.25},
+        {l.waist, 0.184 * waist, (0.120 + belly) * waist, (0.112 - 0.4 * belly) * waist, 0.034 * u, 2.2, 2.2},
+        {l.underbust, 0.179 * ribs, 0.117 * ribs, 0.121 * ribs, 0.031 * u, 2.3, 2.3},
+        {l.chest, 0.177 * cage, 0.108 * cage, 0.122 * cage, 0.024 * u, 2.4, 2.45},
+        {axilla, tip - 0.016 * u, 0.082 * cage, 0.114 * cage, 0.016 * u, 2.35, 2.6},
+        {l.shoulder, tip, 0.058 * cage, 0.088 * cage, 0.012 * u, 2.2, 2.3},
+        {l.hps + 0.004 * u, tip + 0.03 * u, 0.150 * neck, 0.150 * neck, 0.018 * u, 2.05, 2.0},
+        {l.hps + 0.045 * u, tip + 0.03 * u, 0.158 * neck, 0.152 * neck, 0.032 * u, 2.0, 2.0},
+        {l.hps + 0.13 * u, tip + 0.03 * u, 0.158 * neck, 0.154 * neck, 0.060 * u, 2.0, 2.0},
+    };
+  }
+  const auto profile = [&](double Level::*member, double round) {
+    std::vector<std::pair<double, double>> knots;
+    for (const Level& level : levels) knots.emplace_back(level.y, level.*member);
+    return Profile(knots, round * u);
+  };
+  const Profile wide = profile(&Level::width, 0.024);
+  front_ = profile(&Level::front, 0.024);
+  back_ = profile(&Level::back, 0.024);
+  centre_ = profile(&Level::centre, 0.026);
+  front_power_ = profile(&Level::front_power, 0.02);
+  back_power_ = profile(&Level::back_power, 0.02);
+  // The shoulder line: a slope that leaves the neck in a hollow curve and is rounded off at the shoulder.
+  const double hollow = 0.020 * u;
+  width_ = Profile::sampled(l.bottom - 0.05 * u, l.hps + 0.15 * u, 0.004 * u, [&](double y) {
+    const double run = (l.hps - y) / slope / hollow;
+    const double line = neck_half + hollow * (run > 30 ? run : std::log1p(std::exp(run)));
+    return smooth_min(line, wide.at(y).f, 0.07 * u);
+  });
+
+  // ---- neck ----
+  const double tilt = 24 * pi / 180;
+  l.neck_normal = {0, std::cos(tilt), std::sin(tilt)};
+  l.neck_point = {0, l.hps, centre_.at(l.hps).f - 0.008 * u};
+  l.top = l.hps + 0.075 * u;
+
+  // ---- arms ----
+  const double angle = params.arm_angle, forward = 0.05;
+  l.arm_direction = Vector3d(std::cos(angle), -std::sin(angle), forward).normalized();
+  l.arm_outer = Vector3d(std::sin(angle), std::cos(angle), 0);
+  const double upper = m.biceps * tuning.biceps / (2 * pi), wrist = m.wrist * tuning.wrist / (2 * pi);
+  // The underarm: let down by a deeper root and a wider blend, drawn up by the contrary.
+  const double root = tuning.arm_root;
+  arm_blend_ = std::clamp(0.075 * u + 0.8 * root, 0.03 * u, 0.12 * u);
+  l.arm_joint = {l.half_shoulder - 0.030 * u, l.shoulder - 0.058 * u - 0.3 * std::min(root, 0.0), 0.012 * u};
+  l.elbow = tuning.elbow;
+  l.hand = tuning.hand;
+  l.biceps = 0.52 * l.elbow;
+  struct Ring {
+    double s, high, low, deep;
+  };
+  const double e = l.elbow, h = l.hand;
+  const std::vector<Ring> rings = {
+      {-0.10 * u, 0.062 * u, 0.062 * u, 1.18 * upper}, {0.0, 0.060 * u, 0.062 * u, 1.22 * upper}, {0.22 * e, 1.12 * upper, 1.05 * upper, 1.12 * upper},
+      {0.52 * e, 0.98 * upper, 1.0 * upper, 1.02 * upper}, {0.80 * e, 0.86 * upper, 0.86 * upper, 0.90 * upper}, {e, 0.80 * upper, 0.80 * upper, 0.86 * upper},
+      {e + 0.25 * (h - e), 0.82 * upper, 0.80 * upper, 0.86 * upper}, {e + 0.65 * (h - e), 0.4 * upper + 0.5 * wrist, 0.4 * upper + 0.5 * wrist, 0.44 * upper + 0.5 * wrist},
+      {h, 0.88 * wrist, 0.88 * wrist, 1.11 * wrist}, {h + 0.05 * u, 0.9 * wrist, 0.9 * wrist, 1.15 * wrist}};
+  const auto arm_profile = [&](double Ring::*member, double drop) {
+    std::vector<std::pair<double, double>> knots;
+    for (const Ring& ring : rings) knots.emplace_back(ring.s, ring.*member);
+    const Profile plain(knots, 0.014 * u);
+    return Profile::sampled(-0.12 * u, h + 0.06 * u, 0.005 * u, [&](double s) {
+      return plain.at(s).f + drop * std::exp(-std::pow(s / (0.075 * u), 2));
+    });
+  };
+  arm_high_ = arm_profile(&Ring::high, 0);
+  arm_low_ = arm_profile(&Ring::low, tuning.arm_root);
+  arm_deep_ = arm_profile(&Ring::deep, 0);
+
+  // ---- muscle and bone ----
+  const auto front = [&](double y) { return centre_.at(y).f + front_.at(y).f; };
+  const auto back = [&](double y) { return centre_.at(y).f - back_.at(y).f; };
+  const double blade = l.armpit + 0.035 * u;
+  bump(0.085, blade, back(blade), 0.055, 0.075, 0.05, 0.008);                                   // shoulder blades
+  bump(0, 0.5 * (l.waist + l.armpit), back(l.armpit), 0.022, 0.14, 0.06, male ? -0.009 : -0.007);  // hollow of the spine
+  bump(0.085, l.seat + 0.01 * u, back(l.seat), 0.055, 0.06, 0.05, male ? 0.010 : 0.012);         // buttocks
+  bump(0, l.seat - 0.02 * u, back(l.seat), 0.016, 0.07, 0.05, -0.014);                           // between them
+  bump(0, l.hips - 0.01 * u, front(l.hips), 0.09, 0.06, 0.05, male ? 0.003 : 0.005);             // belly
+  if (male) {
+    bump(0.085, l.chest + 0.015 * u, front(l.chest), 0.060, 0.048, 0.05, 0.009);  // chest muscles
+    bump(0, l.chest + 0.01 * u, front(l.chest), 0.018, 0.07, 0.05, -0.006);       // breast bone
+  } else {
+    Breast b;
+    const double span = m.bustSpan.value_or(0.185 * m.chest) / 2;
+    const double base = front(l.chest);
+    const double size = 0.066 * u;
+    const double out = 0.060 * u * tuning.chest + (tuning.chest - 1) * 0.25 * m.chest;
+    b.radii = {size, 1.02 * size, std::max(0.02 * u, out)};
+    b.centre = {span - 0.004 * u, l.bust + 0.002 * u, base - 0.030 * u};
+    b.blend = 0.045 * u;
+    breast_ = b;
+    bump(0.078, l.bust + 0.055 * u, base - 0.01 * u, 0.050, 0.045, 0.05, 0.008);  // the breast's upper slope
+  }
+  // Collar bones' hollow over the shoulder front
+  bump(0.075, l.hps - 0.045 * u, front(l.hps - 0.045 * u) - 0.012 * u, 0.045, 0.016, 0.04, -0.004);
+}
+
+double Shape::torso(const Vector3d& p) const {
+  const double u = levels_.unit;
+  const auto w = width_.at(p.y()), df = front_.at(p.y()), db = back_.at(p.y()), c = centre_.at(p.y());
+  const double s = p.z() - c.f;
+  const double sigma = frontness(s, 0.03 * u);
+  const double n = back_power_.at(p.y()).f * (1 - sigma) + front_power_.at(p.y()).f * sigma;
+  const double d = db.f + (df.f - db.f) * sigma, dd = db.d + (df.d - db.d) * sigma;
+  const double A = std::abs(p.x()) / w.f, B = std::abs(s) / d;
+  const double big = std::max({A, B, 1e-3});
+  const double g = big * std::pow(std::pow(A / big, n) + std::pow(B / big, n), 1 / n);
+  const double a = std::pow(A / g, n - 1), b = std::pow(B / g, n - 1);
+  const double gx = a / w.f, gz = b / d;
+  const double gy = -a * A * w.d / w.f - b * B * dd / d - (s > 0 ? 1 : -1) * gz * c.d;
+  return (g - 1) / std::sqrt(gx * gx + gy * gy + gz * gz + 1e-6);
+}
+
+double Shape::arm(const Vector3d& p) const {
+  const double u = levels_.unit;
+  const Vector3d q = p - levels_.arm_joint;
+  const double t = q.dot(levels_.arm_direction);
+  const double a = q.dot(levels_.arm_outer), b = q.dot(levels_.arm_direction.cross(levels_.arm_outer));
+  const double sigma = frontness(a, 0.012 * u);
+  const auto high = arm_high_.at(t), low = arm_low_.at(t), deep = arm_deep_.at(t);
+  const double r = low.f + (high.f - low.f) * sigma, dr = low.d + (high.d - low.d) * sigma;
+  const double A = a / r, B = b / deep.f, T = std::min(t, 0.0) / (0.055 * u);
+  const double g = std::max(1e-3, std::sqrt(A * A + B * B + T * T));
+  const double ga = A / g / r, gb = B / g / deep.f, gt = (-A * A * dr / r - B * B * deep.d / deep.f + T / (0.055 * u)) / g;
+  const double tube = (g - 1) / std::sqrt(ga * ga + gb * gb + gt * gt);
+  return smooth_max(tube, t - (levels_.hand + 0.012 * u), 0.02 * u);
+}
+
+double Shape::operator()(const Vector3d& p) const {
+  const double u = levels_.unit;
+  const Vector3d q(std::abs(p.x()), p.y(), p.z());
+  double f = torso(p);
+  if (breast_) {
+    const auto one = [&](double side) {
+      const Vector3d r = (Vector3d(p.x() * side, p.y(), p.z()) - breast_->centre).cwiseQuotient(breast_->radii);
+      const double g = std::max(1e-3, r.norm());
+      return (g - 1) / r.cwiseQuotient(breast_->radii).norm() * g;
+    };
+    f = smooth_min(f, smooth_min(one(1), one(-1), 0.03 * u), breast_->blend);
+  }
+  for (const Bump& b : bumps_) {
+    const auto one = [&](double side) {
+      const Vector3d r = (Vector3d(p.x() * side, p.y(), p.z()) - b.centre).cwiseQuotient(b.size);
+      const double sq = r.squaredNorm();
+      return sq > 20 ? 0.0 : std::exp(-sq);
+    };
+    f -= b.height * (b.centre.x() > 0 ? one(1) + one(-1) : one(1));
+  }
+  if (params_.arms) f = smooth_min(f, arm(q), arm_blend_);
+  f = smooth_max(f, levels_.bottom - p.y(), 0.035 * u);
+  // The neck's cap leans less than its base.
+  const Vector3d cap(0, std::cos(0.2), std::sin(0.2));
+  const double over = (p - Vector3d(0, levels_.top, centre_.at(levels_.top).f)).dot(cap);
+  return smooth_max(f, over, 0.018 * u);
+}
+
+double Shape::sizing(const Vector3d& p) const {
+  const double u = levels_.unit;
+  double s = 1;
+  const double over = (p.y() - levels_.hps + 0.03 * u) / (0.04 * u);
+  s -= 0.25 * std::clamp(over, 0.0, 1.0);
+  if (params_.arms) {
+    const double t = (Vector3d(std::abs(p.x()), p.y(), p.z()) - levels_.arm_joint).dot(levels_.arm_direction) / levels_.hand;
+    if (p.x() > levels_.half_shoulder - 0.05 * u) s -= 0.45 * std::clamp((t - 0.05) / 0.95, 0.0, 1.0);
+  }
+  return s;
+}
+
+Vector3d Shape::low() const { return {0, levels_.bottom - 0.03 * levels_.unit, -0.26 * levels_.unit - 0.1}; }
+Vector3d Shape::high() const {
+  const double u = levels_.unit;
+  const double out = params_.arms ? levels_.arm_joint.x() + (levels_.hand + 0.05 * u) * levels_.arm_direction.x() + 0.06 * u : 0;
+  return {std::max(out, 0.45 * u), levels_.top + 0.06 * u, 0.42 * u};
+}
+
+}  // namespace toile::form
