@@ -65,7 +65,7 @@ Tuning corrected(Tuning t, const Measurements& m, const FormParams& params, cons
     scale(t.biceps, "biceps", m.biceps);
     scale(t.wrist, "wrist", m.wrist);
     shift(t.arm_root, "waistToArmpit", m.waistToArmpit, -0.7, 0.012 * u);
-    t.arm_root = std::clamp(t.arm_root, -0.06 * u, 0.12 * u);
+    t.arm_root = std::clamp(t.arm_root, -0.1 * u, 0.15 * u);
     shift(t.elbow, "shoulderToElbow", m.shoulderToElbow, 1.0, 0.03 * u);
     shift(t.hand, "shoulderToWrist", m.shoulderToWrist, 1.0, 0.05 * u);
   }

@@ -125,7 +125,7 @@ Shape::Shape(const Measurements& m, const FormParams& params, const Tuning& tuni
   const double cage = male ? chest : std::min(0.97 * m.chest, 1.06 * ribs_asked);
   const double belly = std::clamp((m.waist / m.chest - (male ? 0.8 : 0.76)) * 0.14, -0.01, 0.05);
   // With arms the torso ends inside the shoulder; without them it makes the shoulder itself.
-  const double tip = l.half_shoulder + (params.arms ? -0.004 * u : 0.018 * u);
+  const double tip = l.half_shoulder + (params.arms ? -0.004 * u : 0.026 * u);
   const double axilla = l.shoulder - 0.062 * u;
   const double under_seat = l.seat - 0.055 * u;
 
@@ -180,7 +180,7 @@ Shape::Shape(const Measurements& m, const FormParams& params, const Tuning& tuni
   width_ = Profile::sampled(l.bottom - 0.05 * u, l.hps + 0.15 * u, 0.004 * u, [&](double y) {
     const double run = (l.hps - y) / slope / hollow;
     const double line = neck_half + hollow * (run > 30 ? run : std::log1p(std::exp(run)));
-    return smooth_min(line, wide.at(y).f, 0.07 * u);
+    return smooth_min(line, wide.at(y).f, (params.arms ? 0.07 : 0.05) * u);
   });
 
   // ---- neck ----
@@ -317,6 +317,12 @@ double Shape::sizing(const Vector3d& p) const {
   if (params_.arms) {
     const double t = (Vector3d(std::abs(p.x()), p.y(), p.z()) - levels_.arm_joint).dot(levels_.arm_direction) / levels_.hand;
     if (p.x() > levels_.half_shoulder - 0.05 * u) s -= 0.45 * std::clamp((t - 0.05) / 0.95, 0.0, 1.0);
+  }
+  if (params_.arms) {
+    // The hollow under the arm is narrow.
+    const Vector3d pit(levels_.half_shoulder - 0.01 * u, levels_.armpit, levels_.arm_joint.z());
+    const double near = (Vector3d(std::abs(p.x()), p.y(), p.z()) - pit).squaredNorm() / (0.0036 * u * u);
+    s *= 1 - 0.3 * std::exp(-near);
   }
   return s;
 }
