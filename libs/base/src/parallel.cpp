@@ -1,6 +1,7 @@
 #include "toile/base/parallel.h"
 
 #include <tbb/blocked_range.h>
+#include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
@@ -11,11 +12,13 @@ namespace toile {
 namespace {
 int configured_threads = 0;
 std::unique_ptr<tbb::task_arena> arena;
+std::unique_ptr<tbb::global_control> allowance;  // for more threads than processors, as determinism tests ask for
 }  // namespace
 
 void set_thread_count(int threads) {
   configured_threads = threads;
   arena.reset();
+  allowance.reset();
 }
 
 int thread_count() {
@@ -30,6 +33,7 @@ void run_chunks(std::size_t chunks, const std::function<void(std::size_t)>& body
     for (std::size_t c = 0; c < chunks; ++c) body(c);
     return;
   }
+  if (!allowance) allowance = std::make_unique<tbb::global_control>(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
   if (!arena) arena = std::make_unique<tbb::task_arena>(threads);
   arena->execute([&] {
     tbb::parallel_for(
