@@ -461,26 +461,29 @@ int improve(LocalMesh& mesh, const ImproveOptions& options) {
   return below;
 }
 
-int split_border_edge(LocalMesh& mesh, int a, int b, const LocalVertex& vertex) {
-  int found = -1;
+int split_edge(LocalMesh& mesh, int a, int b, const LocalVertex& vertex) {
+  std::vector<int> found;
   for (int t : mesh.stars[a]) {
     const Triple& v = mesh.triangles[t];
-    if (v[0] == b || v[1] == b || v[2] == b) {
-      TOILE_CHECK(found < 0, "edge {} {} is not on the border", a, b);
-      found = t;
-    }
+    if (v[0] == b || v[1] == b || v[2] == b) found.push_back(t);
   }
-  TOILE_CHECK(found >= 0, "no triangle has the edge {} {}", a, b);
-  const Triple t = mesh.triangles[found];
-  int k = 0;
-  while (!(ordered(t[k], t[(k + 1) % 3]) == ordered(a, b))) ++k;
-  const int p = t[k], q = t[(k + 1) % 3], r = t[(k + 2) % 3];
+  TOILE_CHECK(!found.empty(), "no triangle has the edge {} {}", a, b);
   const int m = static_cast<int>(mesh.vertices.size());
   mesh.vertices.push_back(vertex);
   mesh.stars.emplace_back();
-  set_triangle(mesh, found, {p, m, r});
-  mesh.triangles.push_back({-1, -1, -1});
-  set_triangle(mesh, static_cast<int>(mesh.triangles.size()) - 1, {m, q, r});
+  for (int old : found) {
+    const Triple t = mesh.triangles[old];
+    int k = 0;
+    while (!(ordered(t[k], t[(k + 1) % 3]) == ordered(a, b))) ++k;
+    const int p = t[k], q = t[(k + 1) % 3], r = t[(k + 2) % 3];
+    set_triangle(mesh, old, {p, m, r});
+    mesh.triangles.push_back({-1, -1, -1});
+    set_triangle(mesh, static_cast<int>(mesh.triangles.size()) - 1, {m, q, r});
+  }
+  if (mesh.constraints.erase(ordered(a, b)) > 0) {
+    mesh.constraints.insert(ordered(a, m));
+    mesh.constraints.insert(ordered(m, b));
+  }
   return m;
 }
 

@@ -54,8 +54,8 @@ struct ImproveOptions {
 /// ret  number of triangles still below the target
 int improve(LocalMesh& mesh, const ImproveOptions& options);
 
-/// Splits an edge of the border at p; returns the new vertex. Precondition: exactly one triangle has the edge.
-int split_border_edge(LocalMesh& mesh, int a, int b, const LocalVertex& vertex);
+/// Puts a vertex into an edge and cuts the triangles at it; returns the vertex. Precondition: the edge exists.
+int split_edge(LocalMesh& mesh, int a, int b, const LocalVertex& vertex);
 
 /// Smallest angle of a triangle [deg], negative where it is turned over.
 double smallest_angle(const Point& a, const Point& b, const Point& c);
