@@ -79,10 +79,8 @@ class Table {
         if (curves_.back().corner(k)) held_[row[k].second] = 1;
       }
     }
-    for (const auto& point : garment.points) {
-      held_[point.vertex] = 1;
-      mesh_.vertices[point.vertex].mobility = Mobility::fixed;
-    }
+    // A point that is only named may slide along its edge by part of a cell; a match point may not (see join()).
+    for (const auto& point : garment.points) mesh_.vertices[point.vertex].mobility = Mobility::fixed;
     // Border vertices that belong to no run (there should be none) stay too.
     for (Eigen::Index f = 0; f < garment.face_count(); ++f) {
       for (int k = 0; k < 3; ++k) {
@@ -399,6 +397,7 @@ Result<std::vector<std::array<int, 2>>> join(Table& table, const GarmentMesh& ga
       }
     }
     if (at[0] < 0 || at[1] < 0) return seam_issue(spec, "bad_match", "a match point is not on its side of the seam", "name points on the edges that are sewn");
+    for (std::size_t side = 0; side < 2; ++side) nodes[side][static_cast<std::size_t>(at[side])].held = true;
     between.push_back(at);
   }
   std::sort(between.begin(), between.end());
