@@ -3,6 +3,7 @@
 #include "render.h"
 #include "toile/base/text.h"
 #include "toile/inspect/color_map.h"
+#include "toile/inspect/measures.h"
 #include "toile/inspect/strain.h"
 #include "toile/mesh/topology.h"
 
@@ -262,7 +263,7 @@ void add_surface(RenderScene& scene, Surface surface, const mesh::Points3& x, co
 
 bool pictures_available() { return render_available(); }
 
-Result<ColorField> color_field(const std::string& name, const mesh::GarmentMesh& g, const mesh::SupportMesh*) {
+Result<ColorField> color_field(const std::string& name, const mesh::GarmentMesh& g, const mesh::SupportMesh* support) {
   const auto faces = [](std::string title, const Eigen::VectorXd& values, double factor) {
     ColorField field{std::move(title), ColorField::Place::faces, {}, true};
     for (const double v : values) field.values.push_back(factor * v);
@@ -274,6 +275,13 @@ Result<ColorField> color_field(const std::string& name, const mesh::GarmentMesh&
   if (name == "shear") return faces("shear angle [\xC2\xB0]", face_strain(g).shear, 1 / degree);
   if (name == "tension_warp") return faces("warp tension [N/m]", face_tension(g, face_strain(g)).warp, 1);
   if (name == "tension_weft") return faces("weft tension [N/m]", face_tension(g, face_strain(g)).weft, 1);
+  if (name == "ease" && support != nullptr) {
+    ColorField field{"ease [mm]", ColorField::Place::vertices, {}, false};
+    for (const double e : signed_distances(g.x, *support)) field.values.push_back(1e3 * e);
+    // Cloth inside the body has to catch the eye.
+    field.diverging = std::any_of(field.values.begin(), field.values.end(), [](double e) { return e < 0; });
+    return field;
+  }
   const auto column = [&](const mesh::Column& c, ColorField::Place place) {
     ColorField field{name, place, {}, false};
     for (std::size_t i = 0; i < c.size(); ++i) field.values.push_back(c.integer ? c.integers[i] : c.reals[i]);
@@ -282,7 +290,8 @@ Result<ColorField> color_field(const std::string& name, const mesh::GarmentMesh&
   };
   if (const auto it = g.face_columns.find(name); it != g.face_columns.end()) return column(it->second, ColorField::Place::faces);
   if (const auto it = g.vertex_columns.find(name); it != g.vertex_columns.end()) return column(it->second, ColorField::Place::vertices);
-  std::vector<std::string> known{"plain", "panel", "strain_warp", "strain_weft", "strain_bias", "shear", "tension_warp", "tension_weft"};
+  if (name == "ease") return Issue{"needs_support", {.item = "color"}, "ease is the distance to a support, and none is given", "add --support FILE", Category::input};
+  std::vector<std::string> known{"plain", "panel", "strain_warp", "strain_weft", "strain_bias", "shear", "tension_warp", "tension_weft", "ease"};
   for (const auto& [key, c] : g.face_columns) known.push_back(key);
   for (const auto& [key, c] : g.vertex_columns) known.push_back(key);
   return Issue{"unknown_color", {.item = "color"}, fmt::format("the garment has nothing called '{}' to show as colour", name), suggestion(name, known), Category::input};
