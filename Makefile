@@ -29,8 +29,11 @@ test: configure
 	@cmake --build $(BUILD) -j $(JOBS)
 	@ctest --test-dir $(BUILD) --output-on-failure -j $(JOBS)
 
-bench: tools
-	@scripts/bench.sh $(BUILD) build/bench
+bench: deps
+	@cmake --preset release -DTOILE_BENCH=ON
+	@cmake --build $(BUILD) --target tools pipeline_bench -j $(JOBS)
+	@mkdir -p build/bench
+	@$(BUILD)/bench/pipeline_bench $(BUILD)/bin pipelines/tee/pipeline.yaml build/bench build/bench/report.json
 
 docs: tools
 	@scripts/generate-docs.sh $(BUILD)/bin docs/stages

@@ -1,0 +1,685 @@
+#include "toile/base/text.h"
+#include "toile/io/pattern_import.h"
+
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <set>
+
+namespace toile::io {
+namespace {
+
+using nlohmann::ordered_json;
+using pattern::Curve;
+using pattern::Point2;
+using pattern::Segment;
+
+constexpr double same_place = 1e-3;  // drafts are rounded to 1e-4 mm or better [mm]
+
+struct DraftPath {
+  std::vector<std::vector<Segment>> strokes;  ///< one for each move
+};
+
+struct DraftPart {
+  std::string name;
+  std::vector<std::pair<std::string, Point2>> points;  ///< in the draft's order
+  std::vector<std::pair<std::string, DraftPath>> paths;
+  std::vector<std::string> drawn;  ///< names of paths that are not hidden
+  std::vector<Point2> notches;
+  std::vector<std::pair<std::string, Point2>> buttons;  ///< kind, position
+  std::optional<std::pair<Point2, Point2>> grain, fold;
+  struct Cut {
+    std::string material;
+    int copies = 1;
+    bool identical = false, on_fold = false;
+  };
+  std::vector<Cut> cuts;
+  bool grain_is_fold = false;
+
+  const Point2* find(const std::string& point) const {
+    for (const auto& [name, p] : points) {
+      if (name == point) return &p;
+    }
+    return nullptr;
+  }
+  const DraftPath* path(const std::string& id) const {
+    for (const auto& [name, p] : paths) {
+      if (name == id) return &p;
+    }
+    return nullptr;
+  }
+  std::vector<std::string> point_names() const {
+    std::vector<std::string> names;
+    for (const auto& [name, p] : points) names.push_back(name);
+    return names;
+  }
+  std::vector<std::string> path_names() const {
+    std::vector<std::string> names;
+    for (const auto& [name, p] : paths) names.push_back(name);
+    return names;
+  }
+};
+
+struct Draft {
+  std::string design, version;
+  std::vector<DraftPart> parts;
+};
+
+/// Reads the JSON; anything of another shape than expected throws, with the place in words.
+class DraftReader {
+ public:
+  static Draft read(const ordered_json& root) {
+    Draft draft;
+    need(root.is_object() && root.contains("parts") && root["parts"].is_object(), "the file", "an object with 'parts'");
+    draft.design = root.value("design", "");
+    if (root.contains("version") && root["version"].is_string()) draft.version = root["version"];
+    const std::string units = root.value("units", "mm");
+    need(units == "mm", "units", "mm");
+    for (const auto& [name, part] : root["parts"].items()) {
+      draft.parts.push_back(read_part(name, part));
+      if (root.contains("cutlist") && root["cutlist"].is_object() && root["cutlist"].contains(name)) read_cuts(root["cutlist"][name], draft.parts.back());
+    }
+    return draft;
+  }
+
+ private:
+  struct Malformed : std::runtime_error {
+    using std::runtime_error::runtime_error;
+  };
+  static void need(bool condition, const std::string& where, const std::string& wanted) {
+    if (!condition) throw Malformed(fmt::format("{}: {} is needed", where, wanted));
+  }
+  static Point2 point(const ordered_json& j, const std::string& where) {
+    if (j.is_object()) {
+      need(j.contains("x") && j.contains("y") && j["x"].is_number() && j["y"].is_number(), where, "a position");
+      return {j["x"].get<double>(), j["y"].get<double>()};
+    }
+    need(j.is_array() && j.size() == 2 && j[0].is_number() && j[1].is_number(), where, "a position [x, y]");
+    return {j[0].get<double>(), j[1].get<double>()};
+  }
+
+  static DraftPart read_part(const std::string& name, const ordered_json& j) {
+    DraftPart part;
+    part.name = name;
+    need(j.is_object() && j.contains("points") && j["points"].is_object() && j.contains("paths") && j["paths"].is_object(), name, "an object with points and paths");
+    for (const auto& [id, p] : j["points"].items()) part.points.emplace_back(id, point(p, name + "." + id));
+    for (const auto& [id, path] : j["paths"].items()) {
+      part.paths.emplace_back(id, read_path(path, name + "." + id));
+      if (!path.value("hidden", false)) part.drawn.push_back(id);
+    }
+    for (const char* key : {"notches", "buttons"}) {
+      if (!j.contains(key)) continue;
+      need(j[key].is_array(), name + "." + key, "a list");
+      for (const auto& snippet : j[key]) {
+        need(snippet.is_object() && snippet.contains("at"), name + "." + key, "objects with 'at'");
+        const Point2 at = point(snippet["at"], name + "." + key);
+        if (key[0] == 'n') part.notches.push_back(at);
+        else part.buttons.emplace_back(snippet.value("def", "button"), at);
+      }
+    }
+    if (j.contains("grainline") && j["grainline"].is_array() && j["grainline"].size() == 2) {
+      part.grain = {point(j["grainline"][0], name + ".grainline"), point(j["grainline"][1], name + ".grainline")};
+    }
+    return part;
+  }
+
+  static DraftPath read_path(const ordered_json& j, const std::string& where) {
+    DraftPath path;
+    need(j.is_object() && j.contains("segments") && j["segments"].is_array(), where, "an object with a list of segments");
+    std::optional<Point2> start, last;
+    for (const auto& s : j["segments"]) {
+      need(s.is_object() && s.contains("type") && s["type"].is_string(), where, "segments with a type");
+      const std::string type = s["type"];
+      if (type == "move") {
+        start = last = point(s.at("to"), where);
+        path.strokes.emplace_back();
+        continue;
+      }
+      if (type != "line" && type != "cubic" && type != "close") continue;  // noop and the like draw nothing
+      need(last.has_value(), where, "a move before any other segment");
+      const Point2 to = type == "close" ? *start : point(s.at("to"), where);
+      Segment segment = pattern::line_segment(*last, to);
+      if (type == "cubic") segment = pattern::cubic_segment(*last, point(s.at("cp1"), where), point(s.at("cp2"), where), to);
+      const double size = (to - *last).norm() + (type == "cubic" ? (segment.control_1 - *last).norm() + (segment.control_2 - to).norm() : 0);
+      if (size > same_place) path.strokes.back().push_back(segment);
+      last = to;
+    }
+    std::erase_if(path.strokes, [](const auto& stroke) { return stroke.empty(); });
+    return path;
+  }
+
+  static void read_cuts(const ordered_json& j, DraftPart& part) {
+    if (!j.is_object()) return;
+    if (j.contains("cutOnFold") && j["cutOnFold"].is_array() && j["cutOnFold"].size() == 2) {
+      part.fold = {point(j["cutOnFold"][0], part.name + " fold"), point(j["cutOnFold"][1], part.name + " fold")};
+    }
+    part.grain_is_fold = j.contains("grainOrigin") && j["grainOrigin"] == "cutonfold";
+    if (!j.contains("materials") || !j["materials"].is_object()) return;
+    for (const auto& [material, list] : j["materials"].items()) {
+      need(list.is_array(), part.name + " cut list", "a list for each material");
+      for (const auto& cut : list) {
+        part.cuts.push_back({material, cut.value("cut", 1), cut.value("identical", false), cut.value("onFold", false)});
+      }
+    }
+  }
+};
+
+std::vector<std::string> run_points(const std::string& run) {
+  std::vector<std::string> names;
+  for (const std::string& name : split(run, '>')) names.emplace_back(trim(name));
+  return names;
+}
+
+/// A closed loop of segments whose ends are nodes; node i is where segment i starts.
+struct Loop {
+  std::vector<Segment> segments;
+  std::size_t size() const { return segments.size(); }
+  Point2 node(std::size_t i) const { return segments[i].from; }
+  Curve curve() const { return Curve(segments); }
+};
+
+class PieceImport {
+ public:
+  PieceImport(const DraftPart& part, const ImportPiece& spec, double tolerance, std::string file)
+      : part_(part), spec_(spec), tolerance_(tolerance * 1e3), file_(std::move(file)) {}
+
+  Result<pattern::Piece> run(Issues& notes) {
+    piece_.name = spec_.name;
+    choose_cut();
+    std::vector<std::string> wanted = spec_.points;
+    if (auto loop = closed_path(spec_.path.empty() ? seam_path() : spec_.path)) {
+      for (const std::string& shortcut : spec_.shortcuts) take_shortcut(*loop, shortcut);
+      insert_run_points(*loop, spec_.edges);
+      piece_.outline = name_edges(*loop, spec_.edges, true);
+    }
+    for (const auto& [name, hole] : spec_.holes) {
+      if (auto loop = closed_path(hole.path)) {
+        insert_run_points(*loop, hole.edges);
+        piece_.holes.push_back({name, name_edges(*loop, hole.edges, false)});
+      }
+    }
+    if (!issues_.empty()) return issues_;
+    for (const ImportSplit& split : spec_.splits) {
+      auto result = pattern::split_edge(piece_, pattern::LengthUnit::mm, split.edge, {.point = split.point, .distance = split.distance * 1e3}, split.first, split.second);
+      if (result) piece_ = std::move(*result);
+      else append(issues_, result.issues());
+    }
+    for (const std::string& name : spec_.points) {
+      if (const Point2* p = part_.find(name)) piece_.points.try_emplace(final_name(name), *p);
+      else unknown_point("points", name);
+    }
+    import_grain();
+    import_lines();
+    import_notches(notes);
+    import_buttons(notes);
+    if (!issues_.empty()) return issues_;
+    return std::move(piece_);
+  }
+
+ private:
+  void report(const char* code, const std::string& what_part, std::string what, std::string remedy) {
+    issues_.push_back(Issue{code, {.file = file_, .item = what_part.empty() ? spec_.name : spec_.name + "." + what_part}, std::move(what), std::move(remedy)});
+  }
+  void unknown_point(const std::string& where, const std::string& name) {
+    report("unknown_point", where, fmt::format("part '{}' has no point '{}'", part_.name, name), suggestion(name, part_.point_names()));
+  }
+  std::string final_name(const std::string& drafted) const {
+    const auto it = spec_.rename.find(drafted);
+    if (it != spec_.rename.end()) return it->second;
+    std::string name = drafted;
+    for (char& c : name) {
+      if (!std::isalnum(static_cast<unsigned char>(c)) && c != '_' && c != '-') c = '_';
+    }
+    if (name.empty() || std::isdigit(static_cast<unsigned char>(name.front()))) name = "p" + name;
+    return name;
+  }
+
+  void choose_cut() {
+    const DraftPart::Cut* chosen = nullptr;
+    for (const DraftPart::Cut& cut : part_.cuts) {
+      if (!chosen && (spec_.material.empty() || cut.material == spec_.material)) chosen = &cut;
+    }
+    piece_.material = spec_.material;
+    if (chosen) {
+      piece_.material = chosen->material;
+      piece_.copies = chosen->copies;
+      piece_.identical = chosen->identical;
+      on_fold_ = chosen->on_fold;
+    } else if (!spec_.material.empty() && !part_.cuts.empty()) {
+      std::vector<std::string> materials;
+      for (const DraftPart::Cut& cut : part_.cuts) materials.push_back(cut.material);
+      report("unknown_material", "material", fmt::format("the cut list of '{}' has no material '{}'", part_.name, spec_.material), suggestion(spec_.material, materials));
+    }
+    if (spec_.cut) piece_.copies = *spec_.cut;
+    if (spec_.identical) piece_.identical = *spec_.identical;
+    if (piece_.copies == 1) piece_.identical = false;
+  }
+
+  std::string seam_path() const {
+    if (part_.path("seam")) return "seam";
+    std::vector<std::string> closed;
+    for (const std::string& name : part_.drawn) {
+      const DraftPath* path = part_.path(name);
+      if (name.rfind("sa", 0) != 0 && path->strokes.size() == 1 && (path->strokes[0].front().from - path->strokes[0].back().to).norm() <= same_place) closed.push_back(name);
+    }
+    return closed.size() == 1 ? closed.front() : "seam";
+  }
+
+  std::optional<Loop> closed_path(const std::string& name) {
+    const DraftPath* path = part_.path(name);
+    if (!path) {
+      report("unknown_path", name, fmt::format("part '{}' has no path '{}'", part_.name, name), suggestion(name, part_.path_names()));
+      return std::nullopt;
+    }
+    if (path->strokes.size() != 1 || (path->strokes[0].front().from - path->strokes[0].back().to).norm() > same_place) {
+      report("bad_draft", name, fmt::format("path '{}' is not one closed line", name), "name a path that is");
+      return std::nullopt;
+    }
+    Loop loop{path->strokes[0]};
+    // Ends within rounding become equal; nodes take the place of a drafted point that they carry.
+    for (std::size_t i = 0; i < loop.size(); ++i) {
+      Point2 node = loop.segments[i].from;
+      for (const auto& [id, p] : part_.points) {
+        if ((p - node).norm() <= same_place) {
+          node = p;
+          break;
+        }
+      }
+      loop.segments[i].from = node;
+      loop.segments[(i + loop.size() - 1) % loop.size()].to = node;
+    }
+    return loop;
+  }
+
+  std::optional<std::size_t> node_at(const Loop& loop, const Point2& p) const {
+    for (std::size_t i = 0; i < loop.size(); ++i) {
+      if ((loop.node(i) - p).norm() <= same_place) return i;
+    }
+    return std::nullopt;
+  }
+
+  /// Makes a node of a drafted point that lies on the loop; false if it does not.
+  bool insert_node(Loop& loop, const std::string& name, const std::string& where) {
+    const Point2* p = part_.find(name);
+    if (!p) {
+      unknown_point(where, name);
+      return false;
+    }
+    if (node_at(loop, *p)) return true;
+    const Curve curve = loop.curve();
+    const Curve::Nearest nearest = curve.nearest(*p);
+    if (nearest.distance > tolerance_) {
+      report("run_off_outline", where, fmt::format("point '{}' is {:.4g} mm away from the line", name, nearest.distance), "name a point that lies on it, or raise the tolerance");
+      return false;
+    }
+    const auto& starts = curve.segment_starts();
+    std::size_t i = 0;
+    while (i + 1 < loop.size() && starts[i + 1] <= nearest.s) ++i;
+    const auto [a, b] = Curve({loop.segments[i]}).split(nearest.s - starts[i]);
+    Segment first = a.segments().front(), second = b.segments().front();
+    moved_[name] = first.to;
+    loop.segments[i] = first;
+    loop.segments.insert(loop.segments.begin() + static_cast<std::ptrdiff_t>(i) + 1, second);
+    return true;
+  }
+  void insert_run_points(Loop& loop, const std::map<std::string, std::string>& edges) {
+    for (const auto& [edge, run] : edges) {
+      for (const std::string& name : run_points(run)) insert_node(loop, name, edge);
+    }
+  }
+  /// Node of a point named in a run; insert_node has made it.
+  std::optional<std::size_t> node_of(const Loop& loop, const std::string& name) const {
+    const auto moved = moved_.find(name);
+    const Point2* p = moved != moved_.end() ? &moved->second : part_.find(name);
+    return p ? node_at(loop, *p) : std::nullopt;
+  }
+
+  void take_shortcut(Loop& loop, const std::string& text) {
+    const std::vector<std::string> names = run_points(text);
+    if (names.size() != 2) return report("bad_run", "shortcuts", fmt::format("'{}' is no shortcut", text), "write two points: a>b");
+    if (!insert_node(loop, names[0], "shortcuts") || !insert_node(loop, names[1], "shortcuts")) return;
+    const std::size_t a = *node_of(loop, names[0]), b = *node_of(loop, names[1]);
+    if (a == b) return report("bad_run", "shortcuts", fmt::format("'{}' starts and ends at the same point", text), "write two points: a>b");
+    std::vector<Segment> kept{pattern::line_segment(loop.node(a), loop.node(b))};
+    for (std::size_t i = b; i != a; i = (i + 1) % loop.size()) kept.push_back(loop.segments[i]);
+    if (kept.size() < 2) return report("bad_run", "shortcuts", fmt::format("'{}' leaves nothing of the outline", text), "swap its points");
+    loop.segments = std::move(kept);
+  }
+
+  /// Nodes i0, i1, … of a run on the loop, walking in its direction; empty with an issue if it does not fit.
+  std::optional<std::pair<std::size_t, std::size_t>> locate_run(const Loop& loop, const std::string& edge, const std::string& run) {
+    const std::vector<std::string> names = run_points(run);
+    if (names.size() < 2) {
+      report("bad_run", edge, fmt::format("'{}' is no run of points", run), "write at least two points: a>b");
+      return std::nullopt;
+    }
+    std::vector<std::size_t> nodes;
+    for (const std::string& name : names) {
+      const auto node = node_of(loop, name);
+      if (!node) return std::nullopt;  // told when it was to be inserted
+      nodes.push_back(*node);
+    }
+    const std::size_t n = loop.size();
+    // Steps from the first node to the last when every node between is met in order; 0: it is not.
+    const auto walk = [&](const std::vector<std::size_t>& stops) -> std::size_t {
+      std::size_t steps = 0;
+      for (std::size_t i = 0; i + 1 < stops.size(); ++i) steps += (stops[i + 1] + n - stops[i]) % n == 0 ? n : (stops[i + 1] + n - stops[i]) % n;
+      return steps <= n && (steps < n || stops.front() == stops.back()) ? steps : 0;
+    };
+    const std::vector<std::size_t> back(nodes.rbegin(), nodes.rend());
+    const std::size_t forwards = walk(nodes), backwards = walk(back);
+    if (forwards == 0 && backwards == 0) {
+      report("bad_run", edge, fmt::format("the points of '{}' do not follow each other on the outline", run), "list them in order");
+      return std::nullopt;
+    }
+    if (forwards == backwards) {
+      report("run_ambiguous", edge, fmt::format("'{}' can be walked both ways round", run), "name a point between");
+      return std::nullopt;
+    }
+    const bool along = backwards == 0 || (forwards != 0 && forwards < backwards);
+    return along ? std::pair{nodes.front(), forwards} : std::pair{back.front(), backwards};
+  }
+
+  std::string node_name(const Point2& p) {
+    const auto it = std::find_if(piece_.points.begin(), piece_.points.end(), [&](const auto& entry) { return entry.second == p; });
+    if (it != piece_.points.end()) return it->first;
+    // Names that the spec uses come before others, helpers of the drawing last.
+    std::string best;
+    int best_rank = 4;
+    for (const auto& [name, at] : part_.points) {
+      const auto moved = moved_.find(name);
+      if (((moved != moved_.end() ? moved->second : at) - p).norm() > same_place) continue;
+      const int rank = spec_.rename.count(name) ? 0 : used_.count(name) ? 1 : name.rfind("gridAnchor", 0) == 0 || name == "anchor" || name.front() == '_' ? 3 : 2;
+      if (rank < best_rank) best = name, best_rank = rank;
+    }
+    std::string name = best.empty() ? "" : final_name(best);
+    for (int i = 1; name.empty() || (piece_.points.count(name) && piece_.points[name] != p); ++i) name = fmt::format("{}{}", best.empty() ? "p" : final_name(best) + "_", i);
+    piece_.points[name] = p;
+    return name;
+  }
+
+  std::vector<pattern::Edge> name_edges(const Loop& loop, const std::map<std::string, std::string>& runs, bool is_outline) {
+    const std::size_t n = loop.size();
+    for (const auto& [edge, run] : runs) {
+      for (const std::string& name : run_points(run)) used_.insert(name);
+    }
+    std::vector<std::string> owner(n);
+    std::vector<bool> first(n, false);
+    for (const auto& [edge, run] : runs) {
+      const auto located = locate_run(loop, edge, run);
+      if (!located) continue;
+      const auto [start, count] = *located;
+      first[start] = true;
+      for (std::size_t k = 0; k < count; ++k) {
+        std::string& name = owner[(start + k) % n];
+        if (!name.empty()) {
+          report("edges_overlap", edge, fmt::format("it shares a part of the outline with edge '{}', from '{}'", name, node_name(loop.node((start + k) % n))), "let edges meet at their ends");
+          break;
+        }
+        name = edge;
+      }
+    }
+    if (!issues_.empty()) return {};
+    if (is_outline) find_fold(loop, owner, first);
+    for (std::size_t i = 0; i < n; ++i) first[i] = first[i] || owner[i].empty();
+    // Begin where an edge begins.
+    std::size_t begin = 0;
+    while (begin < n && !first[begin]) ++begin;
+    begin %= n;
+    std::vector<pattern::Edge> edges;
+    for (std::size_t k = 0; k < n; ++k) {
+      const std::size_t i = (begin + k) % n;
+      const std::string from = node_name(loop.node(i)), to = node_name(loop.segments[i].to);
+      if (first[i] || edges.empty()) {
+        pattern::Edge edge;
+        edge.name = owner[i].empty() ? free_name(from + "_" + to) : owner[i];
+        taken_.insert(edge.name);
+        edge.from = from;
+        edges.push_back(std::move(edge));
+      }
+      edges.back().to = to;
+      edges.back().segments.push_back(loop.segments[i]);
+    }
+    return edges;
+  }
+  std::string free_name(const std::string& wanted) const {
+    std::string name = wanted;
+    for (int i = 2; taken_.count(name) || spec_.edges.count(name); ++i) name = fmt::format("{}_{}", wanted, i);
+    return name;
+  }
+
+  /// Gives the straight part of the outline on the fold line its name, and the piece its fold.
+  void find_fold(const Loop& loop, std::vector<std::string>& owner, std::vector<bool>& first) {
+    if (spec_.fold == "none") return;
+    const std::size_t n = loop.size();
+    if (!spec_.fold.empty() && std::find(owner.begin(), owner.end(), spec_.fold) != owner.end()) {
+      piece_.fold = spec_.fold;
+      return;
+    }
+    const bool folded = part_.fold && (on_fold_ || piece_.copies == 1);
+    if (!folded) {
+      if (!spec_.fold.empty()) report("unknown_edge", "fold", fmt::format("there is no edge '{}', and the draft has no fold", spec_.fold), "name an edge among 'edges', or none");
+      return;
+    }
+    const Point2 a = part_.fold->first, d = (part_.fold->second - a).normalized();
+    const auto on_line = [&](const Point2& p) { return std::abs(d.x() * (p - a).y() - d.y() * (p - a).x()) <= same_place * 10; };
+    std::vector<bool> on(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      const Segment& s = loop.segments[i];
+      on[i] = on_line(s.from) && on_line(s.to) && on_line(position(s, 0.31)) && on_line(position(s, 0.72));
+    }
+    std::size_t start = n;
+    for (std::size_t i = 0; i < n; ++i) {
+      if (on[i] && !on[(i + n - 1) % n]) start = start == n ? i : start;
+    }
+    if (start == n) {
+      if (on_fold_) report("no_fold_edge", "fold", "the cut list puts the part on the fold, but no edge lies on the fold line", "write fold: none and how often it is cut");
+      return;
+    }
+    if (!owner[start].empty()) {
+      piece_.fold = owner[start];
+      return;
+    }
+    const std::string name = spec_.fold.empty() ? free_name("fold") : spec_.fold;
+    first[start] = true;
+    for (std::size_t i = start; on[i] && owner[i].empty(); i = (i + 1) % n) owner[i] = name;
+    piece_.fold = name;
+  }
+
+  void import_grain() {
+    std::optional<std::pair<Point2, Point2>> grain;
+    if (spec_.grain == "x") {
+      grain = {Point2(0, 0), Point2(100, 0)};
+    } else if (spec_.grain == "y") {
+      grain = {Point2(0, 100), Point2(0, 0)};
+    } else if (spec_.grain == "fold") {
+      if (!piece_.fold) report("no_fold_edge", "grain", "the grain follows the fold, but the piece has none", "name the fold, or another grain");
+      return;
+    } else if (!spec_.grain.empty()) {
+      const std::vector<std::string> names = run_points(spec_.grain);
+      if (names.size() != 2) return report("bad_run", "grain", fmt::format("'{}' is no grain", spec_.grain), "write x, y, fold or two points a>b");
+      for (const std::string& name : names) {
+        if (!part_.find(name)) return unknown_point("grain", name);
+      }
+      grain = {*part_.find(names[0]), *part_.find(names[1])};
+    } else if (part_.grain) {
+      grain = part_.grain;
+      // An arrow has two heads in most drafts: the warp is taken up the page (y is down), or to the right.
+      const Point2 d = grain->second - grain->first;
+      if (d.y() > 0 || (d.y() == 0 && d.x() < 0)) std::swap(grain->first, grain->second);
+    } else {
+      if (!(part_.grain_is_fold && piece_.fold)) report("grain_missing", "grain", "the draft has no grain line for it", "write grain: x, y, fold or two points a>b");
+      return;
+    }
+    piece_.grain = pattern::Grain{grain->first, grain->second};
+  }
+
+  void import_lines() {
+    for (const auto& [name, line] : spec_.lines) {
+      if (!line.run.empty()) {
+        std::vector<Segment> segments;
+        std::optional<Point2> last;
+        for (const std::string& point : run_points(line.run)) {
+          const Point2* p = part_.find(point);
+          if (!p) {
+            unknown_point(name, point);
+            continue;
+          }
+          if (last) segments.push_back(pattern::line_segment(*last, *p));
+          last = *p;
+        }
+        piece_.lines.push_back({name, line.kind, std::move(segments)});
+        continue;
+      }
+      const DraftPath* path = part_.path(line.path);
+      if (!path) {
+        report("unknown_path", name, fmt::format("part '{}' has no path '{}'", part_.name, line.path), suggestion(line.path, part_.path_names()));
+        continue;
+      }
+      for (std::size_t i = 0; i < path->strokes.size(); ++i) piece_.lines.push_back({i == 0 ? name : fmt::format("{}_{}", name, i + 1), line.kind, path->strokes[i]});
+    }
+  }
+
+  std::string drafted_name(const Point2& p, const std::string& otherwise) const {
+    for (const auto& [name, at] : part_.points) {
+      if ((at - p).norm() <= same_place && name.front() != '_') return final_name(name);
+    }
+    return otherwise;
+  }
+  template <class Items>
+  static std::string unused(const Items& items, const std::string& wanted) {
+    std::string name = wanted;
+    const auto taken = [&](const std::string& n) { return std::any_of(items.begin(), items.end(), [&](const auto& item) { return item.name == n; }); };
+    for (int i = 2; taken(name); ++i) name = fmt::format("{}_{}", wanted, i);
+    return name;
+  }
+
+  void import_notches(Issues& notes) {
+    for (const auto& [name, notch] : spec_.notches) {
+      pattern::Notch n{.name = name, .edge = notch.edge, .fraction = notch.fraction};
+      if (notch.distance) n.distance = *notch.distance * 1e3;
+      if (notch.point) {
+        const Point2* p = part_.find(*notch.point);
+        if (!p) {
+          unknown_point(name, *notch.point);
+          continue;
+        }
+        n.point = piece_.points.try_emplace(final_name(*notch.point), *p).first->first;
+      }
+      piece_.notches.push_back(std::move(n));
+    }
+    for (const Point2& at : part_.notches) {
+      const std::string name = drafted_name(at, "notch");
+      const pattern::Edge* best = nullptr;
+      double distance = tolerance_;
+      const auto look = [&](const std::vector<pattern::Edge>& edges) {
+        for (const pattern::Edge& edge : edges) {
+          const Curve::Nearest nearest = Curve(edge.segments).nearest(at);
+          if (nearest.distance <= distance && (!best || nearest.distance < distance)) best = &edge, distance = nearest.distance;
+        }
+      };
+      look(piece_.outline);
+      for (const pattern::Hole& hole : piece_.holes) look(hole.edges);
+      if (best) {
+        const std::string point = piece_.points.try_emplace(name, at).first->first;
+        piece_.notches.push_back({.name = unused(piece_.notches, name), .edge = best->name, .point = point});
+      } else if (on_piece(at)) {
+        piece_.marks.push_back({unused(piece_.marks, name), pattern::MarkKind::drill, at});
+      } else {
+        notes.push_back(Issue{"notch_left_out", {.file = file_, .item = spec_.name + "." + name}, fmt::format("the notch at ({:.6g}, {:.6g}) is not on the piece", at.x(), at.y()), ""});
+      }
+    }
+  }
+
+  void import_buttons(Issues& notes) {
+    for (const auto& [def, at] : part_.buttons) {
+      const pattern::MarkKind kind = def.rfind("buttonhole", 0) == 0 ? pattern::MarkKind::buttonhole : def.rfind("snap", 0) == 0 ? pattern::MarkKind::snap : pattern::MarkKind::button;
+      const std::string name = drafted_name(at, "button") + (kind == pattern::MarkKind::buttonhole ? "_hole" : "");
+      if (on_piece(at)) piece_.marks.push_back({unused(piece_.marks, name), kind, at});
+      else notes.push_back(Issue{"button_left_out", {.file = file_, .item = spec_.name + "." + name}, fmt::format("the {} at ({:.6g}, {:.6g}) is not on the piece", def, at.x(), at.y()), ""});
+    }
+  }
+
+  bool on_piece(const Point2& p) const {
+    double winding = 0;
+    for (const pattern::Edge& edge : piece_.outline) {
+      const Curve curve(edge.segments);
+      if (curve.nearest(p).distance <= tolerance_) return true;
+      Point2 last = curve.from() - p;
+      for (const double s : curve.sample(0.05)) {
+        const Point2 next = curve.point_at(s) - p;
+        winding += std::atan2(last.x() * next.y() - last.y() * next.x(), last.dot(next));
+        last = next;
+      }
+    }
+    return std::abs(winding) > 1;
+  }
+
+  const DraftPart& part_;
+  const ImportPiece& spec_;
+  double tolerance_;  // [mm]
+  std::string file_;
+  pattern::Piece piece_;
+  Issues issues_;
+  bool on_fold_ = false;
+  std::set<std::string> used_, taken_;
+  std::map<std::string, Point2> moved_;  // drafted points that were moved onto the line
+};
+
+}  // namespace
+
+Result<ImportedPattern> import_freesewing(std::string_view json, const std::string& file, const ImportParams& params) {
+  Draft draft;
+  try {
+    draft = DraftReader::read(ordered_json::parse(json));
+  } catch (const ordered_json::parse_error& e) {
+    const auto before = json.substr(0, std::min(json.size(), e.byte > 0 ? e.byte - 1 : 0));
+    const int line = static_cast<int>(std::count(before.begin(), before.end(), '\n')) + 1;
+    const std::size_t newline = before.rfind('\n');
+    const int column = static_cast<int>(newline == std::string_view::npos ? before.size() : before.size() - newline - 1) + 1;
+    return Issue{"bad_json", {.file = file, .line = line, .column = column}, "the file is no JSON from here on", "write it again with the program it comes from"};
+  } catch (const ordered_json::exception& e) {
+    return Issue{"bad_draft", {.file = file}, e.what(), "give a draft as samples/patterns/freesewing/draft.mjs writes it"};
+  } catch (const std::runtime_error& e) {
+    return Issue{"bad_draft", {.file = file}, e.what(), "give a draft as samples/patterns/freesewing/draft.mjs writes it"};
+  }
+
+  Issues issues;
+  ImportedPattern result;
+  result.pattern.name = params.name.empty() ? draft.design : params.name;
+  result.pattern.origin = !params.origin.empty() ? params.origin : fmt::format("FreeSewing {}{}{}", draft.design, draft.version.empty() ? "" : " ", draft.version);
+  result.pattern.units = pattern::LengthUnit::mm;
+  result.pattern.y_down = true;
+
+  std::vector<ImportPiece> pieces = params.pieces;
+  if (pieces.empty()) {
+    for (const DraftPart& part : draft.parts) {
+      ImportPiece piece;
+      piece.part = part.name;
+      piece.name = part.name.substr(part.name.rfind('.') == std::string::npos ? 0 : part.name.rfind('.') + 1);
+      if (!part.grain && !part.grain_is_fold) piece.grain = "y";
+      pieces.push_back(piece);
+    }
+  }
+  std::vector<std::string> known;
+  for (const DraftPart& part : draft.parts) known.push_back(part.name);
+  for (const ImportPiece& spec : pieces) {
+    const auto part = std::find_if(draft.parts.begin(), draft.parts.end(), [&](const DraftPart& p) { return p.name == spec.part; });
+    if (part == draft.parts.end()) {
+      issues.push_back(Issue{"unknown_part", {.file = file, .item = spec.name}, fmt::format("the draft has no part '{}'", spec.part), suggestion(spec.part, known)});
+      continue;
+    }
+    auto piece = PieceImport(*part, spec, params.tolerance, file).run(result.notes);
+    if (piece) result.pattern.pieces.push_back(std::move(*piece));
+    else append(issues, piece.issues());
+  }
+  if (!issues.empty()) return issues;
+  issues = pattern::check(result.pattern);
+  for (Issue& issue : issues) issue.place.file = file;
+  if (!issues.empty()) return issues;
+  return result;
+}
+
+}  // namespace toile::io

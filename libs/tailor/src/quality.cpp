@@ -1,0 +1,108 @@
+#include "toile/tailor/quality.h"
+
+#include "local_mesh.h"
+
+#include "toile/mesh/topology.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <map>
+#include <numeric>
+
+namespace toile::tailor {
+namespace {
+
+/// Key of an undirected edge.
+std::uint64_t key(int a, int b) { return (static_cast<std::uint64_t>(static_cast<std::uint32_t>(std::min(a, b))) << 32) | static_cast<std::uint32_t>(std::max(a, b)); }
+
+std::vector<std::uint64_t> sorted_edges(const mesh::Triangles& faces) {
+  std::vector<std::uint64_t> keys;
+  keys.reserve(static_cast<std::size_t>(faces.rows()) * 3);
+  for (Eigen::Index f = 0; f < faces.rows(); ++f) {
+    for (int k = 0; k < 3; ++k) keys.push_back(key(faces(f, k), faces(f, (k + 1) % 3)));
+  }
+  std::sort(keys.begin(), keys.end());
+  return keys;
+}
+
+}  // namespace
+
+AngleReport angle_report(const mesh::GarmentMesh& garment) {
+  const std::vector<std::uint64_t> keys = sorted_edges(garment.faces);
+  const auto on_border = [&](int a, int b) {
+    const auto range = std::equal_range(keys.begin(), keys.end(), key(a, b));
+    return range.second - range.first == 1;
+  };
+  AngleReport report;
+  std::vector<double> all;
+  all.reserve(static_cast<std::size_t>(garment.face_count()));
+  for (Eigen::Index f = 0; f < garment.face_count(); ++f) {
+    const std::array<int, 3> v{garment.faces(f, 0), garment.faces(f, 1), garment.faces(f, 2)};
+    const auto corner = angles(garment.uv.row(v[0]), garment.uv.row(v[1]), garment.uv.row(v[2]));
+    double least = 180;
+    for (int k = 0; k < 3; ++k) {
+      if (corner[k] >= least) continue;
+      if (corner[k] < 40 && on_border(v[k], v[(k + 1) % 3]) && on_border(v[k], v[(k + 2) % 3])) continue;
+      least = corner[k];
+    }
+    all.push_back(least);
+    if (least < report.least) report.least = least, report.least_face = static_cast<int>(f);
+    report.below_20 += least < 20;
+    ++report.histogram[static_cast<std::size_t>(std::clamp(static_cast<int>(least / 5), 0, 11))];
+  }
+  if (all.empty()) return report;
+  std::sort(all.begin(), all.end());
+  report.percent_1 = all[all.size() / 100];
+  report.median = all[all.size() / 2];
+  return report;
+}
+
+SurfaceReport surface_report(const mesh::GarmentMesh& garment) {
+  SurfaceReport report;
+  const mesh::Ids particle = mesh::particles(garment);
+  report.particles = particle.size() == 0 ? 0 : particle.maxCoeff() + 1;
+  const mesh::Triangles faces = mesh::mapped(garment.faces, particle);
+  report.components = mesh::component_count(faces);
+  const std::vector<std::uint64_t> keys = sorted_edges(faces);
+  std::size_t edges = 0;
+  std::vector<char> used(static_cast<std::size_t>(report.particles), 0);
+  for (std::size_t i = 0; i < keys.size(); ++i) edges += i == 0 || keys[i] != keys[i - 1];
+  for (Eigen::Index i = 0; i < faces.size(); ++i) used[faces.data()[i]] = 1;
+  report.euler = static_cast<int>(std::count(used.begin(), used.end(), 1)) - static_cast<int>(edges) + static_cast<int>(faces.rows());
+  // Border edges, walked with the surface on the left.
+  std::map<int, std::vector<std::pair<int, double>>> next;
+  for (Eigen::Index f = 0; f < faces.rows(); ++f) {
+    for (int k = 0; k < 3; ++k) {
+      const int a = faces(f, k), b = faces(f, (k + 1) % 3);
+      const auto range = std::equal_range(keys.begin(), keys.end(), key(a, b));
+      if (range.second - range.first != 1) continue;
+      next[a].emplace_back(b, (garment.uv.row(garment.faces(f, k)) - garment.uv.row(garment.faces(f, (k + 1) % 3))).norm());
+    }
+  }
+  for (auto& [particle_id, ways] : next) std::sort(ways.begin(), ways.end());
+  while (!next.empty()) {
+    const int start = next.begin()->first;
+    int current = start;
+    double length = 0;
+    while (true) {
+      const auto it = next.find(current);
+      if (it == next.end()) break;
+      current = it->second.back().first;
+      length += it->second.back().second;
+      it->second.pop_back();
+      if (it->second.empty()) next.erase(it);
+      if (current == start) break;
+    }
+    report.opening_lengths.push_back(length);
+  }
+  std::sort(report.opening_lengths.rbegin(), report.opening_lengths.rend());
+  report.openings = static_cast<int>(report.opening_lengths.size());
+  return report;
+}
+
+std::string place_text(const mesh::GarmentMesh& garment, int vertex) {
+  const std::string& name = garment.panels[static_cast<std::size_t>(garment.vertex_panel[vertex])].name;
+  return fmt::format("{} at ({:.1f}, {:.1f}) cm", name, garment.uv(vertex, 0) * 100, garment.uv(vertex, 1) * 100);
+}
+
+}  // namespace toile::tailor

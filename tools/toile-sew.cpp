@@ -1,0 +1,61 @@
+// Sews the panels of a garment together.
+#include "toile/stage/stage.h"
+#include "toile/tailor/quality.h"
+#include "toile/tailor/sew.h"
+
+namespace {
+
+using namespace toile;
+
+struct SewStage {
+  using Params = tailor::SewParams;
+
+  static stage::Description description() {
+    return {.name = "toile-sew",
+            .version = 1,
+            .summary = "Sews panels along named edges: border particles of the two sides become the same particle.",
+            .example = "toile-sew panels.ply -o sewn.ply --spec pipelines/tee/seams.yaml",
+            .details = "A side of a seam is a chain of edges, panel.edge, in sewing order; '-' before an edge runs it backwards. Edges run "
+                       "counter-clockwise round their panel, so one side of a seam between two panels is always run backwards. Sides are matched "
+                       "by relative arc length; the side with fewer particles gets more. Lengths that differ by more than the tolerance need a "
+                       "declared `ease`. Exit code 4 if lengths differ, a seam is twisted, pinches the cloth or closes a triangle to nothing. "
+                       "docs/tailoring.md says how it is done.",
+            .inputs = {{.name = "garment", .doc = "flat panels from toile-mesh", .kind = stage::FileKind::garment}},
+            .output = stage::FileKind::garment};
+  }
+
+  static Result<stage::Output> run(const Params& params, stage::Run& run) {
+    TOILE_TRY(const mesh::GarmentMesh garment, run.garment("garment"));
+    TOILE_TRY(tailor::Sewn sewn, tailor::sew(garment, params));
+    const tailor::SurfaceReport surface = tailor::surface_report(sewn.garment);
+    run.report("seams", sewn.seams.size());
+    run.report("welds", sewn.garment.welds.size());
+    run.report("particles", surface.particles);
+    run.report("components", surface.components);
+    run.report("openings", surface.openings);
+    run.report("euler", surface.euler);
+    std::string lengths;
+    for (double length : surface.opening_lengths) lengths += fmt::format("{}{:.1f}", lengths.empty() ? "" : " ", length * 1e3);
+    run.report("opening_lengths_mm", lengths);
+    for (const auto& seam : sewn.seams) {
+      run.report(seam.name, fmt::format("{:.2f} mm on {:.2f} mm, {} pairs, {} added, farthest slide {:.2f} mm", seam.length_a * 1e3, seam.length_b * 1e3, seam.pairs, seam.added, seam.farthest_slide * 1e3));
+    }
+    const tailor::AngleReport angles = tailor::angle_report(sewn.garment);
+    run.report("smallest_angle", angles.least, "deg");
+    run.report("smallest_angle_1_percent", angles.percent_1, "deg");
+    run.report("angles_below_20", angles.below_20);
+    double cut_area = 0;
+    for (const auto& panel : sewn.garment.panels) cut_area += panel.cut_area;
+    run.report("area_error", mesh::rest_areas(sewn.garment).sum() / cut_area - 1, "1");
+    if (angles.below_20 > 0) {
+      run.warn({"sharp_triangles", {.item = tailor::place_text(sewn.garment, sewn.garment.faces(angles.least_face, 0))},
+                fmt::format("{} triangles have an angle below 20 degrees, the smallest {:.1f}", angles.below_20, angles.least),
+                "use cells of similar size on both sides of the seams", Category::check});
+    }
+    return stage::Output{std::move(sewn.garment), {}, {}};
+  }
+};
+
+}  // namespace
+
+int main(int argc, char** argv) { return toile::stage::run_main<SewStage>(argc, argv); }
