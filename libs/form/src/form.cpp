@@ -7,6 +7,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <string>
 
 namespace toile::form {
@@ -36,41 +37,64 @@ std::vector<Target> targets(const Measurements& m, const FormParams& params) {
   return t;
 }
 
-/// One round of fitting: every measure corrects the quantity it depends on most.
-Tuning corrected(Tuning t, const Measurements& m, const FormParams& params, const Gauge& g) {
-  const auto value = [&](const char* name) {
-    const auto it = g.values.find(name);
-    return it == g.values.end() ? 0.0 : it->second;
-  };
-  const auto scale = [&](double& factor, const char* name, double requested) {
-    const double measured = value(name);
-    if (measured > 0) factor = std::clamp(factor * std::clamp(requested / measured, 0.85, 1.18), 0.5, 2.0);
-  };
-  const auto shift = [&](double& length, const char* name, double requested, double share, double step) {
-    const double measured = value(name);
-    if (measured > 0) length += std::clamp(share * (requested - measured), -step, step);
-  };
-  const double u = 0.5 * (m.chest + m.hpsToWaistBack / 0.46);
-  scale(t.neck, "neck", m.neck);
-  scale(t.chest, "chest", m.chest);
-  scale(t.waist, "waist", m.waist);
-  scale(t.hips, "hips", m.hips);
-  scale(t.seat, "seat", m.seat);
-  if (params.sex == Sex::female && m.underbust) scale(t.underbust, "underbust", *m.underbust);
-  shift(t.hps_height, "hpsToWaistBack", m.hpsToWaistBack, 0.9, 0.03 * u);
-  shift(t.slope, "shoulderSlope", m.shoulderSlope, 0.8, 0.08);
-  t.slope = std::clamp(t.slope, 0.03, 0.9);
-  shift(t.bust_height, "hpsToBust", m.hpsToBust, -0.9, 0.03 * u);
-  if (params.arms) {
-    scale(t.biceps, "biceps", m.biceps);
-    scale(t.wrist, "wrist", m.wrist);
-    shift(t.arm_root, "waistToArmpit", m.waistToArmpit, -0.7, 0.012 * u);
-    t.arm_root = std::clamp(t.arm_root, -0.1 * u, 0.15 * u);
-    shift(t.elbow, "shoulderToElbow", m.shoulderToElbow, 1.0, 0.03 * u);
-    shift(t.hand, "shoulderToWrist", m.shoulderToWrist, 1.0, 0.05 * u);
+/// Fitting: every measure corrects the quantity it depends on most, by a share of what is missing. A share shrinks when
+/// the measure has been overshot and grows when it hardly moves, so that quantities that act on each other settle.
+class Fitting {
+ public:
+  Fitting(const Measurements& m, const FormParams& params) : m_(m), params_(params) {}
+
+  Tuning corrected(Tuning t, const Gauge& g) {
+    const Measurements& m = m_;
+    const double u = 0.5 * (m.chest + m.hpsToWaistBack / 0.46);
+    const auto scale = [&](double& factor, const char* name, double requested) {
+      const double missing = step(g, name, requested, 1.0);
+      factor = std::clamp(factor * std::clamp(1 + missing / requested, 0.85, 1.18), 0.4, 2.5);
+    };
+    const auto shift = [&](double& length, const char* name, double requested, double share, double most) {
+      length += std::clamp(share * step(g, name, requested, 0.9), -most, most);
+    };
+    scale(t.neck, "neck", m.neck);
+    scale(t.chest, "chest", m.chest);
+    scale(t.waist, "waist", m.waist);
+    scale(t.hips, "hips", m.hips);
+    scale(t.seat, "seat", m.seat);
+    if (params_.sex == Sex::female && m.underbust) scale(t.underbust, "underbust", *m.underbust);
+    shift(t.hps_height, "hpsToWaistBack", m.hpsToWaistBack, 1, 0.03 * u);
+    shift(t.slope, "shoulderSlope", m.shoulderSlope, 0.7, 0.06);
+    t.slope = std::clamp(t.slope, 0.03, 0.9);
+    shift(t.bust_height, "hpsToBust", m.hpsToBust, -1, 0.03 * u);
+    if (params_.arms) {
+      scale(t.biceps, "biceps", m.biceps);
+      scale(t.wrist, "wrist", m.wrist);
+      shift(t.arm_root, "waistToArmpit", m.waistToArmpit, -0.7, 0.012 * u);
+      t.arm_root = std::clamp(t.arm_root, -0.1 * u, 0.15 * u);
+      shift(t.elbow, "shoulderToElbow", m.shoulderToElbow, 1, 0.03 * u);
+      shift(t.hand, "shoulderToWrist", m.shoulderToWrist, 1, 0.05 * u);
+    }
+    return t;
   }
-  return t;
-}
+
+ private:
+  struct History {
+    double share, missing;
+  };
+  double step(const Gauge& g, const char* name, double requested, double share) {
+    const auto it = g.values.find(name);
+    if (it == g.values.end() || it->second <= 0) return 0;
+    const double missing = requested - it->second;
+    const auto [entry, fresh] = history_.try_emplace(name, History{share, missing});
+    History& h = entry->second;
+    if (!fresh) {
+      if (missing * h.missing < 0 && std::abs(missing) > 0.2 * std::abs(h.missing)) h.share = std::max(0.2, 0.65 * h.share);
+      else if (missing * h.missing > 0 && std::abs(missing) > 0.5 * std::abs(h.missing)) h.share = std::min(2.5, 1.25 * h.share);
+      h.missing = missing;
+    }
+    return h.share * missing;
+  }
+  Measurements m_;
+  FormParams params_;
+  std::map<std::string, History> history_;
+};
 
 double misfit(const Gauge& g, const std::vector<Target>& wanted) {
   double worst = 0;
@@ -85,8 +109,8 @@ double misfit(const Gauge& g, const std::vector<Target>& wanted) {
 
 enum Region { torso, neck, arm_left, arm_right };
 
-int region(const Vector3d& p, const Levels& l, const FormParams& params) {
-  if ((p - l.neck_point).dot(l.neck_normal) > 0 && std::abs(p.x()) < 0.6 * l.half_shoulder) return neck;
+int region(const Vector3d& p, const Levels& l, double neck_half, const FormParams& params) {
+  if ((p - l.neck_point).dot(l.neck_normal) > 0 && std::abs(p.x()) < 1.15 * neck_half) return neck;
   if (!params.arms) return torso;
   // The armhole: a plane through the shoulder tip and the armpit.
   const Vector3d q(std::abs(p.x()), p.y(), p.z());
@@ -116,6 +140,7 @@ Result<Form> make_form(const Measurements& m, const FormParams& params) {
 
   const std::vector<Target> wanted = targets(m, params);
   Tuning tuning = first_tuning(m, params);
+  Fitting fitting(m, params);
   Form form;
 
   // First on rough meshes, cheap to make anew in every round.
@@ -127,7 +152,7 @@ Result<Form> make_form(const Measurements& m, const FormParams& params) {
     Gauge gauge = measure(whole.x, whole.faces, shape.levels(), params);
     ++form.iterations;
     if (misfit(gauge, wanted) < 0.006) break;
-    tuning = corrected(tuning, m, params, gauge);
+    tuning = fitting.corrected(tuning, gauge);
   }
 
   // Then the mesh itself: wanted size by wanted number of vertices.
@@ -141,11 +166,12 @@ Result<Form> make_form(const Measurements& m, const FormParams& params) {
     const Sizing sizing = [&](const Vector3d& p) { return edge * shape.sizing(p); };
     half = remesh(attempt == 0 ? start : half, field, sizing, attempt == 0 ? 8 : 4);
     const double ratio = static_cast<double>(mirrored_vertex_count(half)) / params.vertices;
-    if (std::abs(ratio - 1) < 0.025) break;
+    if (std::abs(ratio - 1) < 0.02) break;
     edge *= std::sqrt(ratio);
   }
 
   // Last, the same triangles follow the shape while the measures are brought home on the mesh as it will be delivered.
+  fitting = Fitting(m, params);
   Whole whole;
   Gauge gauge;
   Levels levels;
@@ -159,7 +185,7 @@ Result<Form> make_form(const Measurements& m, const FormParams& params) {
     gauge = measure(whole.x, whole.faces, levels, params);
     ++form.iterations;
     if (misfit(gauge, wanted) < 3e-4) break;
-    tuning = corrected(tuning, m, params, gauge);
+    tuning = fitting.corrected(tuning, gauge);
   }
 
   form.mesh.x = whole.x;
@@ -170,7 +196,7 @@ Result<Form> make_form(const Measurements& m, const FormParams& params) {
   form.mesh.face_region.resize(whole.faces.rows());
   for (Eigen::Index f = 0; f < whole.faces.rows(); ++f) {
     const Vector3d centre = (whole.x.row(whole.faces(f, 0)) + whole.x.row(whole.faces(f, 1)) + whole.x.row(whole.faces(f, 2))).transpose() / 3;
-    form.mesh.face_region[f] = region(centre, levels, params);
+    form.mesh.face_region[f] = region(centre, levels, gauge.landmarks.at("hps_left")[0], params);
   }
   for (const Target& t : wanted) {
     const auto it = gauge.values.find(t.name);

@@ -109,14 +109,26 @@ Gauge measure(const mesh::Points3& x, const mesh::Triangles& faces, const Levels
   level("underbust", l.underbust, "");
   const auto chest = level("chest", l.chest, "chest");
 
-  // Neck: the plane of its base gives the girth and three landmarks.
-  const Plane base{l.neck_point, l.neck_normal};
-  const auto neck = ring(x, faces, base, l.neck_point);
-  g.values["neck"] = neck ? geometry::tape_girth(neck->points, base.normal) : 0;
+  // Neck: girth where a collar sits, landmarks in the plane of its base.
+  const auto collar = ring(x, faces, {l.collar_point, l.neck_normal}, l.collar_point);
+  g.values["neck"] = collar ? geometry::tape_girth(collar->points, l.neck_normal) : 0;
+  const auto neck = ring(x, faces, {l.neck_point, l.neck_normal}, l.neck_point);
   if (!neck || !chest) return g;
   mark("neck_front", crossing(*neck, Vector3d::Zero(), left, fore).value_or(Vector3d::Zero()));
   mark("neck_back", crossing(*neck, Vector3d::Zero(), left, -fore).value_or(Vector3d::Zero()));
-  mark_pair("hps", crossing(*neck, l.neck_point, fore, left).value_or(l.neck_point));
+  // The high point of the shoulder: where the neck's outline, seen from the front, has come down to its base.
+  Vector3d high_point = l.neck_point;
+  if (const auto outline = ring(x, faces, {l.neck_point, fore}, l.neck_point - 0.05 * u * up)) {
+    const Eigen::Index n = outline->points.rows();
+    double nearest = 1e9;
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const Vector3d a = outline->points.row(i), b = outline->points.row((i + 1) % n);
+      if ((a.y() >= l.hps) == (b.y() >= l.hps)) continue;
+      const Vector3d q = a + (b - a) * ((l.hps - a.y()) / (b.y() - a.y()));
+      if (q.x() > 0 && q.x() < nearest) nearest = q.x(), high_point = q;
+    }
+  }
+  mark_pair("hps", high_point);
   const Vector3d hps = at("hps_left");
 
   // Shoulder tip: the top of the section at half the shoulder width.

@@ -122,10 +122,10 @@ Shape::Shape(const Measurements& m, const FormParams& params, const Tuning& tuni
   const double ribs_asked = m.underbust.value_or(male ? 0.5 * (m.chest + m.waist) * 1.0 : 0.45 * m.waist + 0.55 * (m.chest - 0.06 * u));
   const double ribs = ribs_asked * tuning.underbust;
   // The rib cage under the breasts carries on from the underbust; without breasts it is the chest itself.
-  const double cage = male ? chest : std::min(0.97 * m.chest, 1.06 * ribs_asked);
+  const double cage = male ? chest : std::min(0.96 * m.chest, m.highBust ? 0.5 * ribs_asked + 0.52 * *m.highBust : 1.07 * ribs_asked);
   const double belly = std::clamp((m.waist / m.chest - (male ? 0.8 : 0.76)) * 0.14, -0.01, 0.05);
-  // With arms the torso ends inside the shoulder; without them it makes the shoulder itself.
-  const double tip = l.half_shoulder + (params.arms ? -0.004 * u : 0.026 * u);
+  // With arms the torso ends inside the shoulder; without them it goes beyond, and the armhole's plate cuts it.
+  const double tip = l.half_shoulder + (params.arms ? -0.022 * u : 0.05 * u);
   const double axilla = l.shoulder - 0.062 * u;
   const double under_seat = l.seat - 0.055 * u;
 
@@ -133,32 +133,35 @@ Shape::Shape(const Measurements& m, const FormParams& params, const Tuning& tuni
     double y, width, front, back, centre, front_power, back_power;
   };
   std::vector<Level> levels;
+  const double upper_chest = l.chest + 0.45 * (axilla - l.chest);
   if (male) {
     levels = {
-        {l.bottom - 0.03 * u, 0.186 * seat, 0.088 * seat, 0.088 * seat, 0.026 * u, 2.3, 2.3},
-        {under_seat, 0.189 * seat, 0.094 * seat, 0.104 * seat, 0.024 * u, 2.3, 2.3},
-        {l.seat, 0.190 * seat, 0.098 * seat, 0.121 * seat, 0.023 * u, 2.3, 2.35},
-        {l.hips, 0.180 * hips, 0.112 * hips, 0.126 * hips, 0.028 * u, 2.35, 2.35},
+        {l.bottom - 0.03 * u, 0.176 * seat, 0.090 * seat, 0.086 * seat, 0.024 * u, 2.3, 2.3},
+        {under_seat, 0.187 * seat, 0.096 * seat, 0.102 * seat, 0.024 * u, 2.3, 2.3},
+        {l.seat, 0.190 * seat, 0.100 * seat, 0.121 * seat, 0.023 * u, 2.3, 2.35},
+        {l.hips, 0.180 * hips, 0.111 * hips, 0.127 * hips, 0.028 * u, 2.35, 2.35},
         {l.waist, 0.181 * waist, (0.122 + belly) * waist, (0.120 - 0.4 * belly) * waist, 0.038 * u, 2.3, 2.3},
         {l.underbust, 0.176 * ribs, 0.121 * ribs, 0.125 * ribs, 0.037 * u, 2.35, 2.3},
-        {l.chest, 0.176 * chest, 0.117 * chest, 0.117 * chest, 0.030 * u, 2.5, 2.5},
-        {axilla, tip - 0.016 * u, 0.098 * chest, 0.108 * chest, 0.020 * u, 2.4, 2.7},
-        {l.shoulder, tip, 0.066 * chest, 0.088 * chest, 0.014 * u, 2.2, 2.4},
+        {l.chest, 0.176 * chest, 0.118 * chest, 0.117 * chest, 0.031 * u, 2.5, 2.5},
+        {upper_chest, 0.5 * (0.178 * chest + tip - 0.016 * u), 0.115 * chest, 0.116 * chest, 0.026 * u, 2.5, 2.6},
+        {axilla, tip - 0.016 * u, 0.106 * chest, 0.109 * chest, 0.020 * u, 2.4, 2.6},
+        {l.shoulder, tip, 0.083 * chest, 0.092 * chest, 0.014 * u, 2.2, 2.4},
         {l.hps + 0.004 * u, tip + 0.03 * u, 0.150 * neck, 0.150 * neck, 0.022 * u, 2.05, 2.0},
         {l.hps + 0.045 * u, tip + 0.03 * u, 0.158 * neck, 0.150 * neck, 0.036 * u, 2.0, 2.0},
         {l.hps + 0.13 * u, tip + 0.03 * u, 0.158 * neck, 0.154 * neck, 0.064 * u, 2.0, 2.0},
     };
   } else {
     levels = {
-        {l.bottom - 0.03 * u, 0.190 * seat, 0.086 * seat, 0.084 * seat, 0.020 * u, 2.25, 2.25},
-        {under_seat, 0.193 * seat, 0.090 * seat, 0.104 * seat, 0.018 * u, 2.25, 2.25},
-        {l.seat, 0.193 * seat, 0.096 * seat, 0.122 * seat, 0.016 * u, 2.25, 2.3},
+        {l.bottom - 0.03 * u, 0.182 * seat, 0.088 * seat, 0.086 * seat, 0.020 * u, 2.25, 2.25},
+        {under_seat, 0.192 * seat, 0.092 * seat, 0.104 * seat, 0.018 * u, 2.25, 2.25},
+        {l.seat, 0.193 * seat, 0.097 * seat, 0.122 * seat, 0.016 * u, 2.25, 2.3},
         {l.hips, 0.186 * hips, 0.110 * hips, 0.124 * hips, 0.022 * u, 2.25, 2.25},
         {l.waist, 0.184 * waist, (0.120 + belly) * waist, (0.112 - 0.4 * belly) * waist, 0.034 * u, 2.2, 2.2},
         {l.underbust, 0.179 * ribs, 0.117 * ribs, 0.121 * ribs, 0.031 * u, 2.3, 2.3},
-        {l.chest, 0.177 * cage, 0.108 * cage, 0.122 * cage, 0.024 * u, 2.4, 2.45},
-        {axilla, tip - 0.016 * u, 0.082 * cage, 0.114 * cage, 0.016 * u, 2.35, 2.6},
-        {l.shoulder, tip, 0.058 * cage, 0.088 * cage, 0.012 * u, 2.2, 2.3},
+        {l.chest, 0.177 * cage, 0.112 * cage, 0.122 * cage, 0.026 * u, 2.4, 2.45},
+        {upper_chest, 0.5 * (0.178 * cage + tip - 0.016 * u), 0.105 * cage, 0.121 * cage, 0.021 * u, 2.4, 2.5},
+        {axilla, tip - 0.016 * u, 0.094 * cage, 0.114 * cage, 0.016 * u, 2.35, 2.5},
+        {l.shoulder, tip, 0.074 * cage, 0.092 * cage, 0.012 * u, 2.2, 2.3},
         {l.hps + 0.004 * u, tip + 0.03 * u, 0.150 * neck, 0.150 * neck, 0.018 * u, 2.05, 2.0},
         {l.hps + 0.045 * u, tip + 0.03 * u, 0.158 * neck, 0.152 * neck, 0.032 * u, 2.0, 2.0},
         {l.hps + 0.13 * u, tip + 0.03 * u, 0.158 * neck, 0.154 * neck, 0.060 * u, 2.0, 2.0},
@@ -180,13 +183,14 @@ Shape::Shape(const Measurements& m, const FormParams& params, const Tuning& tuni
   width_ = Profile::sampled(l.bottom - 0.05 * u, l.hps + 0.15 * u, 0.004 * u, [&](double y) {
     const double run = (l.hps - y) / slope / hollow;
     const double line = neck_half + hollow * (run > 30 ? run : std::log1p(std::exp(run)));
-    return smooth_min(line, wide.at(y).f, (params.arms ? 0.07 : 0.05) * u);
+    return smooth_min(line, wide.at(y).f, 0.06 * u);
   });
 
   // ---- neck ----
   const double tilt = 24 * pi / 180;
   l.neck_normal = {0, std::cos(tilt), std::sin(tilt)};
   l.neck_point = {0, l.hps, centre_.at(l.hps).f - 0.008 * u};
+  l.collar_point = l.neck_point + 0.012 * u * l.neck_normal;
   l.top = l.hps + 0.075 * u;
 
   // ---- arms ----
@@ -197,7 +201,7 @@ Shape::Shape(const Measurements& m, const FormParams& params, const Tuning& tuni
   // The underarm: let down by a deeper root and a wider blend, drawn up by the contrary.
   const double root = tuning.arm_root;
   arm_blend_ = std::clamp(0.075 * u + 0.8 * root, 0.03 * u, 0.12 * u);
-  l.arm_joint = {l.half_shoulder - 0.030 * u, l.shoulder - 0.058 * u - 0.3 * std::min(root, 0.0), 0.012 * u};
+  l.arm_joint = {l.half_shoulder - 0.036 * u, l.shoulder - 0.055 * u - 0.4 * std::min(root, 0.0), 0.012 * u};
   l.elbow = tuning.elbow;
   l.hand = tuning.hand;
   l.biceps = 0.52 * l.elbow;
@@ -206,7 +210,8 @@ Shape::Shape(const Measurements& m, const FormParams& params, const Tuning& tuni
   };
   const double e = l.elbow, h = l.hand;
   const std::vector<Ring> rings = {
-      {-0.10 * u, 0.062 * u, 0.062 * u, 1.18 * upper}, {0.0, 0.060 * u, 0.062 * u, 1.22 * upper}, {0.22 * e, 1.12 * upper, 1.05 * upper, 1.12 * upper},
+      {-0.10 * u, 0.060 * u, 0.062 * u, 1.18 * upper}, {0.0, 0.062 * u, 0.062 * u, 1.24 * upper},
+      {0.12 * e, 0.030 * u + 0.62 * upper, 0.028 * u + 0.60 * upper, 1.22 * upper}, {0.30 * e, 1.14 * upper, 1.05 * upper, 1.14 * upper},
       {0.52 * e, 0.98 * upper, 1.0 * upper, 1.02 * upper}, {0.80 * e, 0.86 * upper, 0.86 * upper, 0.90 * upper}, {e, 0.80 * upper, 0.80 * upper, 0.86 * upper},
       {e + 0.25 * (h - e), 0.82 * upper, 0.80 * upper, 0.86 * upper}, {e + 0.65 * (h - e), 0.4 * upper + 0.5 * wrist, 0.4 * upper + 0.5 * wrist, 0.44 * upper + 0.5 * wrist},
       {h, 0.88 * wrist, 0.88 * wrist, 1.11 * wrist}, {h + 0.05 * u, 0.9 * wrist, 0.9 * wrist, 1.15 * wrist}};
@@ -215,36 +220,38 @@ Shape::Shape(const Measurements& m, const FormParams& params, const Tuning& tuni
     for (const Ring& ring : rings) knots.emplace_back(ring.s, ring.*member);
     const Profile plain(knots, 0.014 * u);
     return Profile::sampled(-0.12 * u, h + 0.06 * u, 0.005 * u, [&](double s) {
-      return plain.at(s).f + drop * std::exp(-std::pow(s / (0.075 * u), 2));
+      return plain.at(s).f + drop * std::exp(-std::pow(s / (0.085 * u), 2));
     });
   };
   arm_high_ = arm_profile(&Ring::high, 0);
   arm_low_ = arm_profile(&Ring::low, tuning.arm_root);
   arm_deep_ = arm_profile(&Ring::deep, 0);
 
+  // ---- without arms: the plate that closes the armhole, from the shoulder tip to the side under the armpit ----
+  const double side = width_.at(l.chest).f;
+  const Vector3d plate_top(l.half_shoulder + 0.010 * u, l.shoulder, 0), plate_bottom(side + 0.012 * u, l.chest, 0);
+  plate_point_ = plate_top;
+  plate_normal_ = Vector3d(plate_top.y() - plate_bottom.y(), plate_bottom.x() - plate_top.x(), 0).normalized();
+
   // ---- muscle and bone ----
   const auto front = [&](double y) { return centre_.at(y).f + front_.at(y).f; };
   const auto back = [&](double y) { return centre_.at(y).f - back_.at(y).f; };
   const double blade = l.armpit + 0.035 * u;
   bump(0.085, blade, back(blade), 0.055, 0.075, 0.05, 0.008);                                   // shoulder blades
-  bump(0, 0.5 * (l.waist + l.armpit), back(l.armpit), 0.022, 0.14, 0.06, male ? -0.009 : -0.007);  // hollow of the spine
+  bump(0, 0.55 * l.waist + 0.45 * l.armpit, back(l.waist) - 0.01 * u, 0.026, 0.16, 0.07, male ? -0.009 : -0.008);  // hollow of the spine
   bump(0.085, l.seat + 0.01 * u, back(l.seat), 0.055, 0.06, 0.05, male ? 0.010 : 0.012);         // buttocks
   bump(0, l.seat - 0.02 * u, back(l.seat), 0.016, 0.07, 0.05, -0.014);                           // between them
   bump(0, l.hips - 0.01 * u, front(l.hips), 0.09, 0.06, 0.05, male ? 0.003 : 0.005);             // belly
   if (male) {
-    bump(0.085, l.chest + 0.015 * u, front(l.chest), 0.060, 0.048, 0.05, 0.009);  // chest muscles
+    bump(0.085, l.chest + 0.015 * u, front(l.chest), 0.058, 0.045, 0.05, 0.011);  // chest muscles
     bump(0, l.chest + 0.01 * u, front(l.chest), 0.018, 0.07, 0.05, -0.006);       // breast bone
   } else {
     Breast b;
-    const double span = m.bustSpan.value_or(0.185 * m.chest) / 2;
-    const double base = front(l.chest);
-    const double size = 0.066 * u;
-    const double out = 0.060 * u * tuning.chest + (tuning.chest - 1) * 0.25 * m.chest;
-    b.radii = {size, 1.02 * size, std::max(0.02 * u, out)};
-    b.centre = {span - 0.004 * u, l.bust + 0.002 * u, base - 0.030 * u};
-    b.blend = 0.045 * u;
+    b.x = m.bustSpan.value_or(0.185 * m.chest) / 2 - 0.002 * u;
+    b.y = l.bust - 0.004 * u;
+    b.inner = 0.064 * u, b.outer = 0.080 * u, b.upper = 0.090 * u, b.lower = 0.060 * u;
+    b.height = std::max(0.004 * u, 0.042 * u * (1 + 3 * (tuning.chest - 1)));
     breast_ = b;
-    bump(0.078, l.bust + 0.055 * u, base - 0.01 * u, 0.050, 0.045, 0.05, 0.008);  // the breast's upper slope
   }
   // Collar bones' hollow over the shoulder front
   bump(0.075, l.hps - 0.045 * u, front(l.hps - 0.045 * u) - 0.012 * u, 0.045, 0.016, 0.04, -0.004);
@@ -274,9 +281,9 @@ double Shape::arm(const Vector3d& p) const {
   const double sigma = frontness(a, 0.012 * u);
   const auto high = arm_high_.at(t), low = arm_low_.at(t), deep = arm_deep_.at(t);
   const double r = low.f + (high.f - low.f) * sigma, dr = low.d + (high.d - low.d) * sigma;
-  const double A = a / r, B = b / deep.f, T = std::min(t, 0.0) / (0.055 * u);
+  const double A = a / r, B = b / deep.f, T = std::min(t, 0.0) / (0.062 * u);
   const double g = std::max(1e-3, std::sqrt(A * A + B * B + T * T));
-  const double ga = A / g / r, gb = B / g / deep.f, gt = (-A * A * dr / r - B * B * deep.d / deep.f + T / (0.055 * u)) / g;
+  const double ga = A / g / r, gb = B / g / deep.f, gt = (-A * A * dr / r - B * B * deep.d / deep.f + T / (0.062 * u)) / g;
   const double tube = (g - 1) / std::sqrt(ga * ga + gb * gb + gt * gt);
   return smooth_max(tube, t - (levels_.hand + 0.012 * u), 0.02 * u);
 }
@@ -284,14 +291,20 @@ double Shape::arm(const Vector3d& p) const {
 double Shape::operator()(const Vector3d& p) const {
   const double u = levels_.unit;
   const Vector3d q(std::abs(p.x()), p.y(), p.z());
-  double f = torso(p);
+  double f;
   if (breast_) {
+    // The front is drawn forward: a height field over (x, y), flatter on top than a bell, steeper below than above.
     const auto one = [&](double side) {
-      const Vector3d r = (Vector3d(p.x() * side, p.y(), p.z()) - breast_->centre).cwiseQuotient(breast_->radii);
-      const double g = std::max(1e-3, r.norm());
-      return (g - 1) / r.cwiseQuotient(breast_->radii).norm() * g;
+      const double dx = p.x() * side - breast_->x, dy = p.y() - breast_->y;
+      const double wx = breast_->inner + (breast_->outer - breast_->inner) * frontness(dx, 0.02 * u);
+      const double wy = breast_->lower + (breast_->upper - breast_->lower) * frontness(dy, 0.02 * u);
+      const double r_sq = dx * dx / (wx * wx) + dy * dy / (wy * wy);
+      return r_sq > 9 ? 0.0 : std::exp(-std::pow(r_sq, 1.4));
     };
-    f = smooth_min(f, smooth_min(one(1), one(-1), 0.03 * u), breast_->blend);
+    const double fore = frontness(p.z() - centre_.at(p.y()).f - 0.02 * u, 0.03 * u);
+    f = torso({p.x(), p.y(), p.z() - breast_->height * (one(1) + one(-1)) * fore});
+  } else {
+    f = torso(p);
   }
   for (const Bump& b : bumps_) {
     const auto one = [&](double side) {
@@ -301,8 +314,15 @@ double Shape::operator()(const Vector3d& p) const {
     };
     f -= b.height * (b.centre.x() > 0 ? one(1) + one(-1) : one(1));
   }
-  if (params_.arms) f = smooth_min(f, arm(q), arm_blend_);
-  f = smooth_max(f, levels_.bottom - p.y(), 0.035 * u);
+  if (params_.arms) {
+    // A wide fold under the arm, a narrow one over the shoulder, where it would stand up as an epaulette.
+    const double over = frontness(p.y() - levels_.arm_joint.y() - 0.01 * u, 0.025 * u);
+    f = smooth_min(f, arm(q), arm_blend_ + (0.022 * u - arm_blend_) * over);
+  } else {
+    const double below = std::max(levels_.chest + 0.02 * u - p.y(), 0.0);  // the plate ends under the armpit
+    f = smooth_max(f, (q - plate_point_).dot(plate_normal_) - below * below / (0.05 * u), 0.022 * u);
+  }
+  f = smooth_max(f, levels_.bottom - p.y(), 0.055 * u);
   // The neck's cap leans less than its base.
   const Vector3d cap(0, std::cos(0.2), std::sin(0.2));
   const double over = (p - Vector3d(0, levels_.top, centre_.at(levels_.top).f)).dot(cap);
@@ -323,6 +343,10 @@ double Shape::sizing(const Vector3d& p) const {
     const Vector3d pit(levels_.half_shoulder - 0.01 * u, levels_.armpit, levels_.arm_joint.z());
     const double near = (Vector3d(std::abs(p.x()), p.y(), p.z()) - pit).squaredNorm() / (0.0036 * u * u);
     s *= 1 - 0.3 * std::exp(-near);
+  } else {
+    const double off = (Vector3d(std::abs(p.x()), p.y(), p.z()) - plate_point_).dot(plate_normal_) / (0.03 * u);
+    const double high = (p.y() - levels_.chest) / (0.03 * u);
+    s *= 1 - 0.35 * std::exp(-off * off) * frontness(high, 1);
   }
   return s;
 }

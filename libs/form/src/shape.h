@@ -4,6 +4,8 @@
 #include "toile/form/form.h"
 
 #include <Eigen/Core>
+#include <optional>
+#include <utility>
 #include <vector>
 
 namespace toile::form {
@@ -48,6 +50,7 @@ struct Levels {
   double floor = 0, bottom = 0, seat = 0, hips = 0, waist = 0, underbust = 0, chest = 0, bust = 0, armpit = 0, shoulder = 0, hps = 0, top = 0;
   double half_shoulder = 0;
   Eigen::Vector3d neck_point, neck_normal;  ///< plane of the neck's base
+  Eigen::Vector3d collar_point;             ///< a little higher, where the neck's girth is taken
   Eigen::Vector3d arm_joint, arm_direction, arm_outer;  ///< of the left arm (+x)
   double elbow = 0, hand = 0, biceps = 0;   ///< along the arm from the joint
 };
@@ -77,11 +80,11 @@ class Shape {
   Levels levels_;
   Profile width_, front_, back_, centre_, front_power_, back_power_;
   double arm_blend_ = 0.1;
+  Eigen::Vector3d plate_point_, plate_normal_;
   Profile arm_high_, arm_low_, arm_deep_;
   std::vector<Bump> bumps_;
   struct Breast {
-    Eigen::Vector3d centre, radii;
-    double blend = 0;
+    double x, y, inner, outer, upper, lower, height;
   };
   std::optional<Breast> breast_;
 };
