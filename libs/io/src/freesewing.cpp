@@ -182,8 +182,10 @@ struct Loop {
 
 class PieceImport {
  public:
-  PieceImport(const DraftPart& part, const ImportPiece& spec, double tolerance, std::string file)
-      : part_(part), spec_(spec), tolerance_(tolerance * 1e3), file_(std::move(file)) {}
+  /// What to do where the draft does not say enough: ask for it in the spec, or assume it and note so.
+  enum class Gaps { error, assume };
+  PieceImport(const DraftPart& part, const ImportPiece& spec, double tolerance, std::string file, Gaps gaps)
+      : part_(part), spec_(spec), tolerance_(tolerance * 1e3), file_(std::move(file)), gaps_(gaps) {}
 
   Result<pattern::Piece> run(Issues& notes) {
     piece_.name = spec_.name;
@@ -215,10 +217,17 @@ class PieceImport {
     import_notches(notes);
     import_buttons(notes);
     if (!issues_.empty()) return issues_;
+    append(notes, assumed_);
     return std::move(piece_);
   }
 
  private:
+  /// A gap in the draft: an issue, or a note with what is assumed.
+  void gap(const char* code, const std::string& what_part, const std::string& what, const std::string& remedy, const std::string& assumption) {
+    const Place place{.file = file_, .item = spec_.name + "." + what_part};
+    if (gaps_ == Gaps::error) issues_.push_back(Issue{code, place, what, remedy});
+    else assumed_.push_back(Issue{code, place, what + ": " + assumption, remedy});
+  }
   void report(const char* code, const std::string& what_part, std::string what, std::string remedy) {
     issues_.push_back(Issue{code, {.file = file_, .item = what_part.empty() ? spec_.name : spec_.name + "." + what_part}, std::move(what), std::move(remedy)});
   }
@@ -475,7 +484,9 @@ class PieceImport {
       if (on[i] && !on[(i + n - 1) % n]) start = start == n ? i : start;
     }
     if (start == n) {
-      if (on_fold_) report("no_fold_edge", "fold", "the cut list puts the part on the fold, but no edge lies on the fold line", "write fold: none and how often it is cut");
+      if (!on_fold_) return;
+      gap("no_fold_edge", "fold", "the cut list puts the part on the fold, but no edge lies on the fold line", "write fold: none and how often it is cut", "cut twice, mirrored, instead");
+      if (piece_.copies == 1) piece_.copies = 2;
       return;
     }
     if (!owner[start].empty()) {
@@ -510,8 +521,10 @@ class PieceImport {
       const Point2 d = grain->second - grain->first;
       if (d.y() > 0 || (d.y() == 0 && d.x() < 0)) std::swap(grain->first, grain->second);
     } else {
-      if (!(part_.grain_is_fold && piece_.fold)) report("grain_missing", "grain", "the draft has no grain line for it", "write grain: x, y, fold or two points a>b");
-      return;
+      if (part_.grain_is_fold && piece_.fold) return;
+      gap("grain_missing", "grain", "the draft has no grain line for it", "write grain: x, y, fold or two points a>b", "up the page is assumed");
+      if (gaps_ == Gaps::error) return;
+      grain = {Point2(0, 100), Point2(0, 0)};
     }
     piece_.grain = pattern::Grain{grain->first, grain->second};
   }
@@ -608,8 +621,8 @@ class PieceImport {
       const Curve curve(edge.segments);
       if (curve.nearest(p).distance <= tolerance_) return true;
       Point2 last = curve.from() - p;
-      for (const double s : curve.sample(0.05)) {
-        const Point2 next = curve.point_at(s) - p;
+      for (const Point2& point : curve.polyline(0.05)) {
+        const Point2 next = point - p;
         winding += std::atan2(last.x() * next.y() - last.y() * next.x(), last.dot(next));
         last = next;
       }
@@ -622,7 +635,8 @@ class PieceImport {
   double tolerance_;  // [mm]
   std::string file_;
   pattern::Piece piece_;
-  Issues issues_;
+  Gaps gaps_;
+  Issues issues_, assumed_;
   bool on_fold_ = false;
   std::set<std::string> used_, taken_;
   std::map<std::string, Point2> moved_;  // drafted points that were moved onto the line
@@ -659,7 +673,6 @@ Result<ImportedPattern> import_freesewing(std::string_view json, const std::stri
       ImportPiece piece;
       piece.part = part.name;
       piece.name = part.name.substr(part.name.rfind('.') == std::string::npos ? 0 : part.name.rfind('.') + 1);
-      if (!part.grain && !part.grain_is_fold) piece.grain = "y";
       pieces.push_back(piece);
     }
   }
@@ -671,7 +684,8 @@ Result<ImportedPattern> import_freesewing(std::string_view json, const std::stri
       issues.push_back(Issue{"unknown_part", {.file = file, .item = spec.name}, fmt::format("the draft has no part '{}'", spec.part), suggestion(spec.part, known)});
       continue;
     }
-    auto piece = PieceImport(*part, spec, params.tolerance, file).run(result.notes);
+    const auto gaps = params.pieces.empty() ? PieceImport::Gaps::assume : PieceImport::Gaps::error;
+    auto piece = PieceImport(*part, spec, params.tolerance, file, gaps).run(result.notes);
     if (piece) result.pattern.pieces.push_back(std::move(*piece));
     else append(issues, piece.issues());
   }

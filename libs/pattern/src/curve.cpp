@@ -402,8 +402,8 @@ double Curve::sector_area() const {
   return area;
 }
 
-std::vector<double> Curve::sample(double tolerance) const {
-  std::vector<double> result{0};
+std::vector<std::vector<double>> Curve::breaks(double tolerance) const {
+  std::vector<std::vector<double>> result(segments_.size());
   for (std::size_t i = 0; i < segments_.size(); ++i) {
     const Segment& segment = segments_[i];
     if (segment.kind != Segment::Kind::line) {
@@ -429,11 +429,30 @@ std::vector<double> Curve::sample(double tolerance) const {
           stack.push_back({middle, task.t1, task.depth + 1});
           stack.push_back({task.t0, middle, task.depth + 1});
         } else if (task.t1 < 1) {
-          result.push_back(starts_[i] + arc_length(i, task.t1));
+          result[i].push_back(task.t1);
         }
       }
     }
-    result.push_back(starts_[i + 1]);
+    result[i].push_back(1);
+  }
+  return result;
+}
+
+std::vector<double> Curve::sample(double tolerance) const {
+  std::vector<double> result{0};
+  const auto parameters = breaks(tolerance);
+  for (std::size_t i = 0; i < segments_.size(); ++i) {
+    for (const double t : parameters[i]) result.push_back(starts_[i] + arc_length(i, t));
+  }
+  result.back() = length();
+  return result;
+}
+
+std::vector<Point2> Curve::polyline(double tolerance) const {
+  std::vector<Point2> result{from()};
+  const auto parameters = breaks(tolerance);
+  for (std::size_t i = 0; i < segments_.size(); ++i) {
+    for (const double t : parameters[i]) result.push_back(position(segments_[i], t));
   }
   return result;
 }

@@ -15,8 +15,7 @@ Similarity metres_from_pattern(const Pattern& pattern) {
 Polyline flatten(const std::vector<Curve>& curves, double tolerance) {
   Polyline result;
   for (std::size_t i = 0; i < curves.size(); ++i) {
-    for (const double s : curves[i].sample(tolerance)) {
-      const Point2 p = curves[i].point_at(s);
+    for (const Point2& p : curves[i].polyline(tolerance)) {
       if (!result.points.empty() && (p - result.points.back()).norm() <= weld_tolerance / 10) continue;
       if (!result.points.empty()) result.curve.push_back(static_cast<int>(i));
       result.points.push_back(p);

@@ -104,7 +104,7 @@ struct ImportParams {
     f(&ImportParams::name, {.key = "name", .doc = "name of the pattern; without it the design's"});
     f(&ImportParams::origin, {.key = "origin", .doc = "where the pattern comes from and its licence; without it the program and design"});
     f(&ImportParams::tolerance, {.key = "tolerance", .doc = "distance within which a drafted point lies on a line", .unit = "m", .min = 1e-7, .max = 0.01});
-    f(&ImportParams::pieces, {.key = "pieces", .doc = "pieces to take; without any, all parts with edges named by their ends"});
+    f(&ImportParams::pieces, {.key = "pieces", .doc = "pieces to take; without any, all parts with edges named by their ends (a missing grain is taken as up the page)"});
   }
 };
 

@@ -90,6 +90,8 @@ class Curve {
   /// Arc lengths of points along the curve such that chords between them stay within `tolerance` of it; begins with 0
   /// and ends with length(), and holds every segment's ends.
   std::vector<double> sample(double tolerance) const;
+  /// The points at those arc lengths.
+  std::vector<Point2> polyline(double tolerance) const;
 
  private:
   struct Interval {
@@ -102,6 +104,8 @@ class Curve {
   };
   Location locate(double s) const;
   double arc_length(std::size_t segment, double t) const;
+  /// Per segment, parameters of its sample points after its start; the last is 1.
+  std::vector<std::vector<double>> breaks(double tolerance) const;
 
   std::vector<Segment> segments_;
   std::vector<double> starts_;
