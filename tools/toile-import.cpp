@@ -10,14 +10,19 @@ struct ImportStage {
   using Params = io::ImportParams;
 
   static stage::Description description() {
-    return {.name = "toile-import",
-            .version = 1,
-            .summary = "Receives a pattern drawn by another program and writes it as pattern YAML.",
-            .example = "toile-import samples/patterns/freesewing/teagan.json --spec samples/patterns/freesewing/tee.yaml -o tee.yaml",
-            .details = "Reads FreeSewing drafts as JSON. The spec says which parts become pieces and names their edges by runs of drafted "
-                       "points; without a spec all parts are taken and edges are named by their ends. docs/pattern.md tells more.",
-            .inputs = {{"draft", "FreeSewing draft (JSON)"}},
-            .output = stage::FileKind::pattern};
+    return {
+        .name = "toile-import",
+        .version = 1,
+        .summary = "Receives a pattern drawn by another program and writes it as pattern YAML.",
+        .example =
+            "toile-import samples/patterns/freesewing/teagan.json --spec samples/patterns/freesewing/tee.yaml -o "
+            "tee.yaml",
+        .details =
+            "Reads FreeSewing drafts as JSON. The spec says which parts become pieces and names their edges by runs of "
+            "drafted "
+            "points; without a spec all parts are taken and edges are named by their ends. docs/pattern.md tells more.",
+        .inputs = {{"draft", "FreeSewing draft (JSON)"}},
+        .output = stage::FileKind::pattern};
   }
 
   static Result<stage::Output> run(const Params& params, stage::Run& run) {
@@ -36,4 +41,6 @@ struct ImportStage {
 
 }  // namespace
 
-int main(int argc, char** argv) { return stage::run_main<ImportStage>(argc, argv); }
+int main(int argc, char** argv) {
+  return stage::run_main<ImportStage>(argc, argv);
+}

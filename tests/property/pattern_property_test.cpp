@@ -20,10 +20,14 @@ Segment random_segment(Rng& rng, const Point2& a, const Point2& b) {
   const Point2 d = b - a, n(-d.y(), d.x());
   const auto off = [&](double share) { return Point2(a + share * d + rng.uniform(-0.1, 0.1) * n); };
   switch (rng.below(4)) {
-    case 0: return line_segment(a, b);
-    case 1: return quadratic_segment(a, off(0.5), b);
-    case 2: return cubic_segment(a, off(0.3), off(0.7), b);
-    default: return arc_segment(a, b, rng.uniform(-0.15, 0.15));
+    case 0:
+      return line_segment(a, b);
+    case 1:
+      return quadratic_segment(a, off(0.5), b);
+    case 2:
+      return cubic_segment(a, off(0.3), off(0.7), b);
+    default:
+      return arc_segment(a, b, rng.uniform(-0.15, 0.15));
   }
 }
 
@@ -46,7 +50,8 @@ Piece random_piece(Rng& rng, const std::string& name, bool folded, double mm) {
     piece.points[names.back()] = p;
   }
   for (int i = 0; i < corners; ++i) {
-    const std::string &from = names[static_cast<std::size_t>(i)], &to = names[static_cast<std::size_t>((i + 1) % corners)];
+    const std::string &from = names[static_cast<std::size_t>(i)],
+                      &to = names[static_cast<std::size_t>((i + 1) % corners)];
     Edge edge{.name = "e" + std::to_string(i), .from = from, .to = to};
     const Point2 a = piece.points[from], b = piece.points[to];
     if (folded && i == corners - 1) {
@@ -70,7 +75,8 @@ Piece random_piece(Rng& rng, const std::string& name, bool folded, double mm) {
       for (Segment& segment : edge.segments) segment = reversed(segment);
     }
   }
-  if (!folded || rng.below(2) == 0) piece.grain = Grain{centre, centre + 50 * Point2(std::cos(rng.uniform(0, 6)), std::sin(rng.uniform(0, 6)))};
+  if (!folded || rng.below(2) == 0)
+    piece.grain = Grain{centre, centre + 50 * Point2(std::cos(rng.uniform(0, 6)), std::sin(rng.uniform(0, 6)))};
   if (!folded) {
     piece.copies = 1 + static_cast<int>(rng.below(4));
     piece.identical = piece.copies > 1 && rng.below(2) == 0;
@@ -79,11 +85,22 @@ Piece random_piece(Rng& rng, const std::string& name, bool folded, double mm) {
   piece.points["low"] = h - mm * Point2(0, 30);
   piece.points["high"] = h + mm * Point2(0, 30);
   if (rng.below(2) == 0) {
-    piece.holes.push_back({"dart", {Edge{.name = "leg_a", .from = "low", .to = "high", .segments = {quadratic_segment(piece.points["low"], h + mm * Point2(10, 0), piece.points["high"])}},
-                                    Edge{.name = "leg_b", .from = "high", .to = "low", .segments = {arc_segment(piece.points["high"], piece.points["low"], rng.uniform(0.1, 0.3))}}}});
+    piece.holes.push_back(
+        {"dart",
+         {Edge{.name = "leg_a",
+               .from = "low",
+               .to = "high",
+               .segments = {quadratic_segment(piece.points["low"], h + mm * Point2(10, 0), piece.points["high"])}},
+          Edge{.name = "leg_b",
+               .from = "high",
+               .to = "low",
+               .segments = {arc_segment(piece.points["high"], piece.points["low"], rng.uniform(0.1, 0.3))}}}});
     piece.notches.push_back({.name = "on_leg", .edge = "leg_a", .distance = mm * rng.uniform(-20, 20)});
   }
-  piece.lines.push_back({"across", LineKind::fold, {line_segment(h + mm * Point2(20, 0), h + mm * Point2(20, 40)), random_segment(rng, h + mm * Point2(20, 40), h + mm * Point2(30, 60))}});
+  piece.lines.push_back({"across",
+                         LineKind::fold,
+                         {line_segment(h + mm * Point2(20, 0), h + mm * Point2(20, 40)),
+                          random_segment(rng, h + mm * Point2(20, 40), h + mm * Point2(30, 60))}});
   piece.notches.push_back({.name = "n1", .edge = "e0", .fraction = rng.uniform()});
   piece.notches.push_back({.name = "n2", .edge = "e1", .point = piece.outline.front().name == "e0" ? "p1" : "p2"});
   piece.marks.push_back({"m", static_cast<MarkKind>(rng.below(5)), h + mm * Point2(25, rng.uniform(-30, 30))});
@@ -108,7 +125,9 @@ std::vector<CutPanel> cut(const Pattern& pattern) {
   return std::move(*panels);
 }
 
-Point2 flipped(const Point2& p) { return {-p.x(), p.y()}; }
+Point2 flipped(const Point2& p) {
+  return {-p.x(), p.y()};
+}
 
 /// The pattern seen in a mirror (x -> -x).
 Pattern mirrored(Pattern pattern) {
@@ -186,7 +205,9 @@ TEST(PatternProperty, a_mirrored_pattern_gives_mirrored_panels) {
         const double length = edge.curve.length();
         ASSERT_NEAR(length, twin->curve.length(), 1e-12 * length);
         for (const double share : {0.0, 0.21, 0.5, 0.83, 1.0}) {
-          ASSERT_NEAR((flipped(edge.curve.point_at(share * length)) - twin->curve.point_at((1 - share) * length)).norm(), 0, 1e-10 * length);
+          ASSERT_NEAR(
+              (flipped(edge.curve.point_at(share * length)) - twin->curve.point_at((1 - share) * length)).norm(), 0,
+              1e-10 * length);
         }
       };
       for (const PanelEdge& edge : panel.outline) same_edge(edge);
@@ -215,7 +236,8 @@ TEST(PatternProperty, mirrored_copies_are_mirror_images) {
       if (panel.piece != plain.piece) continue;
       ASSERT_NEAR(panel.area, plain.area, 1e-13 * plain.area);
       for (const PanelPoint& p : plain.points) {
-        const auto twin = std::find_if(panel.points.begin(), panel.points.end(), [&](const PanelPoint& q) { return q.name == p.name; });
+        const auto twin = std::find_if(panel.points.begin(), panel.points.end(),
+                                       [&](const PanelPoint& q) { return q.name == p.name; });
         ASSERT_NE(twin, panel.points.end());
         ASSERT_EQ(twin->at, panel.mirrored ? flipped(p.at) : p.at);
       }
@@ -237,9 +259,11 @@ TEST(PatternProperty, unfolding_doubles_the_half) {
     const Point2 a = whole.fold->first, d = (whole.fold->second - a).normalized();
     for (const PanelEdge& edge : whole.outline) {
       const bool twin_half = edge.name.ends_with("_m");
-      const PanelEdge* twin = find_edge(whole, twin_half ? edge.name.substr(0, edge.name.size() - 2) : edge.name + "_m");
+      const PanelEdge* twin =
+          find_edge(whole, twin_half ? edge.name.substr(0, edge.name.size() - 2) : edge.name + "_m");
       ASSERT_TRUE(twin);
-      const Point2 p = edge.curve.point_at(0.3 * edge.curve.length()), q = twin->curve.point_at(0.7 * twin->curve.length());
+      const Point2 p = edge.curve.point_at(0.3 * edge.curve.length()),
+                   q = twin->curve.point_at(0.7 * twin->curve.length());
       const Point2 r = p - a;
       const Point2 image = a + 2 * r.dot(d) * d - r;
       ASSERT_NEAR((image - q).norm(), 0, 1e-10 * whole.perimeter);
@@ -254,7 +278,9 @@ TEST(PatternProperty, splitting_changes_no_area_and_no_length) {
     Rng rng(static_cast<std::uint64_t>(seed) + 1000);
     const double length = Curve(pattern.pieces[0].outline[2].segments).length();
     const std::string name = pattern.pieces[0].outline[2].name;
-    const auto split = split_edge(pattern.pieces[0], pattern.units, name, {.point = "new_point", .distance = rng.uniform(0.01, 0.99) * length}, "part_a", "part_b");
+    const auto split =
+        split_edge(pattern.pieces[0], pattern.units, name,
+                   {.point = "new_point", .distance = rng.uniform(0.01, 0.99) * length}, "part_a", "part_b");
     ASSERT_TRUE(split) << to_string(split.issues().front());
     pattern.pieces[0] = *split;
     const CutPanel after = cut(pattern)[0];
@@ -262,6 +288,7 @@ TEST(PatternProperty, splitting_changes_no_area_and_no_length) {
     ASSERT_NEAR(after.area, before.area, 1e-12 * before.area);
     ASSERT_NEAR(after.perimeter, before.perimeter, 1e-11 * before.perimeter);
     ASSERT_EQ(after.notches.size(), before.notches.size());
-    for (std::size_t k = 0; k < after.notches.size(); ++k) ASSERT_NEAR((after.notches[k].at - before.notches[k].at).norm(), 0, 1e-9 * before.perimeter);
+    for (std::size_t k = 0; k < after.notches.size(); ++k)
+      ASSERT_NEAR((after.notches[k].at - before.notches[k].at).norm(), 0, 1e-9 * before.perimeter);
   }
 }

@@ -14,7 +14,8 @@ namespace {
 double brute_length(const Segment& segment) {
   const auto chords = [&](int n) {
     double sum = 0;
-    for (int i = 0; i < n; ++i) sum += (position(segment, (i + 1.0) / n) - position(segment, static_cast<double>(i) / n)).norm();
+    for (int i = 0; i < n; ++i)
+      sum += (position(segment, (i + 1.0) / n) - position(segment, static_cast<double>(i) / n)).norm();
     return sum;
   };
   const double coarse = chords(20000), fine = chords(40000);
@@ -22,7 +23,8 @@ double brute_length(const Segment& segment) {
 }
 
 const Segment s_shape = cubic_segment({0, 0}, {0.3, 0.4}, {-0.1, 0.2}, {0.25, 0.6});
-const Segment armhole = cubic_segment({231.3377e-3, 234.0373e-3}, {210.7e-3, 213.3997e-3}, {175.8204e-3, 152.6085e-3}, {215e-3, 50.5421e-3});
+const Segment armhole = cubic_segment({231.3377e-3, 234.0373e-3}, {210.7e-3, 213.3997e-3}, {175.8204e-3, 152.6085e-3},
+                                      {215e-3, 50.5421e-3});
 
 }  // namespace
 
@@ -40,7 +42,8 @@ TEST(Curve, lengths_of_known_shapes) {
 }
 
 TEST(Curve, length_agrees_with_brute_force) {
-  for (const Segment& segment : {s_shape, armhole, cubic_segment({0, 0}, {1, 1}, {0, 1}, {1, 0}), quadratic_segment({0, 0}, {1, 0.02}, {0.1, 0.3})}) {
+  for (const Segment& segment : {s_shape, armhole, cubic_segment({0, 0}, {1, 1}, {0, 1}, {1, 0}),
+                                 quadratic_segment({0, 0}, {1, 0.02}, {0.1, 0.3})}) {
     EXPECT_NEAR(Curve({segment}).length(), brute_length(segment), 1e-10);
   }
 }
@@ -55,13 +58,15 @@ TEST(Curve, a_cusp_inside_has_its_length) {
 }
 
 TEST(Curve, point_at_arc_length_agrees_with_brute_force) {
-  const Curve curve({s_shape, cubic_segment({0.25, 0.6}, {0.4, 0.8}, {0.5, 0.2}, {0.7, 0.1}), arc_segment({0.7, 0.1}, {0.9, 0.1}, -0.4)});
+  const Curve curve({s_shape, cubic_segment({0.25, 0.6}, {0.4, 0.8}, {0.5, 0.2}, {0.7, 0.1}),
+                     arc_segment({0.7, 0.1}, {0.9, 0.1}, -0.4)});
   // Walk along by small chords and compare now and then.
   double walked = 0;
   for (std::size_t i = 0; i < curve.segments().size(); ++i) {
     const int n = 200000;
     for (int k = 0; k < n; ++k) {
-      const Point2 a = position(curve.segments()[i], static_cast<double>(k) / n), b = position(curve.segments()[i], (k + 1.0) / n);
+      const Point2 a = position(curve.segments()[i], static_cast<double>(k) / n),
+                   b = position(curve.segments()[i], (k + 1.0) / n);
       walked += (b - a).norm();
       if (k % 20011 == 0) {
         EXPECT_NEAR((curve.point_at(walked) - b).norm(), 0, 1e-9);
@@ -97,7 +102,8 @@ TEST(Curve, curvature_of_an_arc) {
 }
 
 TEST(Curve, split_keeps_shape_and_length) {
-  for (const Segment& segment : {s_shape, armhole, quadratic_segment({0, 0}, {1, 0.02}, {0.1, 0.3}), arc_segment({1, 0}, {-1, 0.2}, -0.7), line_segment({0, 0}, {1, 2})}) {
+  for (const Segment& segment : {s_shape, armhole, quadratic_segment({0, 0}, {1, 0.02}, {0.1, 0.3}),
+                                 arc_segment({1, 0}, {-1, 0.2}, -0.7), line_segment({0, 0}, {1, 2})}) {
     const Curve curve({segment});
     for (const double share : {0.001, 0.3, 0.5, 0.999}) {
       const double s = share * curve.length();
@@ -122,7 +128,8 @@ TEST(Curve, split_at_a_joint_leaves_no_sliver) {
 }
 
 TEST(Curve, area_agrees_with_a_fine_polygon) {
-  for (const Segment& segment : {s_shape, armhole, quadratic_segment({0.3, 0}, {1, 0.02}, {0.1, 0.3}), arc_segment({1, 0.1}, {-1, 0.2}, -1.7), arc_segment({1, 0.1}, {-1, 0.2}, 1e-4)}) {
+  for (const Segment& segment : {s_shape, armhole, quadratic_segment({0.3, 0}, {1, 0.02}, {0.1, 0.3}),
+                                 arc_segment({1, 0.1}, {-1, 0.2}, -1.7), arc_segment({1, 0.1}, {-1, 0.2}, 1e-4)}) {
     double area = 0;
     const int n = 200000;
     for (int i = 0; i < n; ++i) {
@@ -134,7 +141,8 @@ TEST(Curve, area_agrees_with_a_fine_polygon) {
 }
 
 TEST(Curve, area_of_a_circle_of_two_arcs) {
-  EXPECT_NEAR(sector_area(arc_segment({1, 0}, {-1, 0}, 1)) + sector_area(arc_segment({-1, 0}, {1, 0}, 1)), std::numbers::pi, 1e-14);
+  EXPECT_NEAR(sector_area(arc_segment({1, 0}, {-1, 0}, 1)) + sector_area(arc_segment({-1, 0}, {1, 0}, 1)),
+              std::numbers::pi, 1e-14);
 }
 
 TEST(Curve, nearest_agrees_with_brute_force) {
@@ -197,7 +205,8 @@ TEST(Curve, arc_through_three_points) {
 }
 
 TEST(Curve, bounds_hold_the_segment) {
-  for (const Segment& segment : {s_shape, armhole, arc_segment({1, 0.1}, {-1, 0.2}, -1.7), arc_segment({1, 0.1}, {-1, 0.2}, 0.4)}) {
+  for (const Segment& segment :
+       {s_shape, armhole, arc_segment({1, 0.1}, {-1, 0.2}, -1.7), arc_segment({1, 0.1}, {-1, 0.2}, 0.4)}) {
     const auto [low, high] = bounds(segment);
     Point2 seen_low = segment.from, seen_high = segment.from;
     for (int i = 0; i <= 1000; ++i) {

@@ -67,7 +67,9 @@ io::ImportParams params(const std::string& yaml) {
 }
 const std::string good_spec = with(spec, "    tolerance_note: x\n", "");
 
-Result<io::ImportedPattern> import(const std::string& yaml, const std::string& json = draft) { return io::import_freesewing(json, "draft.json", params(yaml)); }
+Result<io::ImportedPattern> import(const std::string& yaml, const std::string& json = draft) {
+  return io::import_freesewing(json, "draft.json", params(yaml));
+}
 
 std::string sample_file(const std::string& name) {
   auto bytes = io::read_file(std::string(TOILE_SOURCE_DIR) + "/samples/" + name);
@@ -113,7 +115,8 @@ TEST(ImportFreesewing, edges_points_fold_and_marks) {
   std::vector<std::string> names;
   for (const Edge& edge : front.outline) names.push_back(edge.name);
   // Unnamed segments are called by their ends; the point with several names by the one that is no helper.
-  EXPECT_EQ(names, (std::vector<std::string>{"top_neck", "shoulder", "side_upper", "side_lower", "corner_hem", "centre"}));
+  EXPECT_EQ(names,
+            (std::vector<std::string>{"top_neck", "shoulder", "side_upper", "side_lower", "corner_hem", "centre"}));
   EXPECT_TRUE(front.points.count("top"));
   EXPECT_FALSE(front.points.count("hemSide"));
   EXPECT_EQ(front.points.at("corner"), Point2(100, 200));
@@ -157,13 +160,16 @@ TEST(ImportFreesewing, without_a_spec_everything_comes) {
 }
 
 TEST(ImportFreesewing, another_material_its_copies_and_shortcuts) {
-  const auto imported = import("pieces: [{name: lining, part: sample.front, material: lining, grain: y, shortcuts: [side>hemSide], edges: {long: side>hemSide}, splits: [{edge: long, distance: 50 mm, point: half, first: a1, second: a2}]}]");
+  const auto imported = import(
+      "pieces: [{name: lining, part: sample.front, material: lining, grain: y, shortcuts: [side>hemSide], edges: "
+      "{long: side>hemSide}, splits: [{edge: long, distance: 50 mm, point: half, first: a1, second: a2}]}]");
   ASSERT_TRUE(imported) << to_string(imported.issues().front());
   const Piece& lining = imported->pattern.pieces[0];
   EXPECT_EQ(lining.copies, 2);
   EXPECT_TRUE(lining.identical);
   EXPECT_FALSE(lining.fold);
-  const auto edge = std::find_if(lining.outline.begin(), lining.outline.end(), [](const Edge& e) { return e.name == "a1"; });
+  const auto edge =
+      std::find_if(lining.outline.begin(), lining.outline.end(), [](const Edge& e) { return e.name == "a1"; });
   ASSERT_NE(edge, lining.outline.end());
   EXPECT_EQ(edge->segments, std::vector<Segment>{line_segment({100, 30}, {100, 80})});
 }
@@ -180,7 +186,9 @@ struct BadImport {
   const char* by;
   const char* code;
 };
-void PrintTo(const BadImport& row, std::ostream* out) { *out << row.name; }
+void PrintTo(const BadImport& row, std::ostream* out) {
+  *out << row.name;
+}
 class ImportMustFail : public testing::TestWithParam<BadImport> {};
 
 TEST_P(ImportMustFail, says_what) {
@@ -194,23 +202,31 @@ TEST_P(ImportMustFail, says_what) {
   EXPECT_FALSE(imported.issues().front().remedy.empty());
 }
 
-INSTANTIATE_TEST_SUITE_P(Rows, ImportMustFail,
-                         testing::Values(BadImport{"part", "sample.front", "sample.frant", "unknown_part"}, BadImport{"path", "path: dart", "path: darts", "unknown_path"},
-                                         BadImport{"open_path", "path: dart", "path: open", "bad_draft"}, BadImport{"point", "neck>side,", "nock>side,", "unknown_point"},
-                                         BadImport{"off_outline", "neck>side,", "neck>off,", "run_off_outline"}, BadImport{"one_point", "neck>side,", "neck,", "bad_run"},
-                                         BadImport{"order", "neck>side,", "neck>hem>side>hemSide,", "bad_run"},
-                                         BadImport{"overlap", "neck>side,", "neck>side>curveMiddle,", "edges_overlap"},
-                                         BadImport{"both_ways", "{shoulder: neck>side, side_upper: side>curveMiddle, side_lower: curveMiddle>hemSide}", "{x: top>side, y: side>hem, z: neck>hemSide, w: top>hemSide}", "edges_overlap"},
-                                         BadImport{"line_path", "path: pocket", "path: pockets", "unknown_path"},
-                                         BadImport{"fold_edge", "fold: centre", "cut: 2\n    fold: centre\n    material: lining\n    grain: y", "unknown_edge"},
-                                         BadImport{"material", "fold: centre", "material: silk", "unknown_material"},
-                                         BadImport{"grain", "fold: centre", "fold: none", "grain_missing"},
-                                         BadImport{"grain_point", "fold: centre", "grain: top>nowhere", "unknown_point"},
-                                         BadImport{"rename_clash", "hemSide: corner", "hemSide: a.b", "bad_name"}),
-                         [](const auto& info) { return std::string(info.param.name); });
+INSTANTIATE_TEST_SUITE_P(
+    Rows, ImportMustFail,
+    testing::Values(BadImport{"part", "sample.front", "sample.frant", "unknown_part"},
+                    BadImport{"path", "path: dart", "path: darts", "unknown_path"},
+                    BadImport{"open_path", "path: dart", "path: open", "bad_draft"},
+                    BadImport{"point", "neck>side,", "nock>side,", "unknown_point"},
+                    BadImport{"off_outline", "neck>side,", "neck>off,", "run_off_outline"},
+                    BadImport{"one_point", "neck>side,", "neck,", "bad_run"},
+                    BadImport{"order", "neck>side,", "neck>hem>side>hemSide,", "bad_run"},
+                    BadImport{"overlap", "neck>side,", "neck>side>curveMiddle,", "edges_overlap"},
+                    BadImport{"both_ways",
+                              "{shoulder: neck>side, side_upper: side>curveMiddle, side_lower: curveMiddle>hemSide}",
+                              "{x: top>side, y: side>hem, z: neck>hemSide, w: top>hemSide}", "edges_overlap"},
+                    BadImport{"line_path", "path: pocket", "path: pockets", "unknown_path"},
+                    BadImport{"fold_edge", "fold: centre",
+                              "cut: 2\n    fold: centre\n    material: lining\n    grain: y", "unknown_edge"},
+                    BadImport{"material", "fold: centre", "material: silk", "unknown_material"},
+                    BadImport{"grain", "fold: centre", "fold: none", "grain_missing"},
+                    BadImport{"grain_point", "fold: centre", "grain: top>nowhere", "unknown_point"},
+                    BadImport{"rename_clash", "hemSide: corner", "hemSide: a.b", "bad_name"}),
+    [](const auto& info) { return std::string(info.param.name); });
 
 TEST(ImportFreesewing, a_fold_without_an_edge_is_told) {
-  const std::string json = with(draft, R"("cutOnFold": [{"x":0,"y":0},{"x":0,"y":180}])", R"("cutOnFold": [{"x":7,"y":0},{"x":7,"y":180}])");
+  const std::string json =
+      with(draft, R"("cutOnFold": [{"x":0,"y":0},{"x":0,"y":180}])", R"("cutOnFold": [{"x":7,"y":0},{"x":7,"y":180}])");
   const auto imported = import(good_spec, json);
   ASSERT_FALSE(imported);
   EXPECT_EQ(imported.issues().front().code, "no_fold_edge");
@@ -271,8 +287,10 @@ TEST(SamplePatterns, seams_of_the_tee_fit) {
     }
     return -1.0;
   };
-  EXPECT_NEAR(from_underarm("front", "armholeNotchFront", "armhole"), from_underarm("sleeve", "frontNotch", "bicepsRight"), 1);
-  EXPECT_NEAR(from_underarm("back", "armholeNotchBack", "armhole"), from_underarm("sleeve", "backNotch", "bicepsLeft"), 1);
+  EXPECT_NEAR(from_underarm("front", "armholeNotchFront", "armhole"),
+              from_underarm("sleeve", "frontNotch", "bicepsRight"), 1);
+  EXPECT_NEAR(from_underarm("back", "armholeNotchBack", "armhole"), from_underarm("sleeve", "backNotch", "bicepsLeft"),
+              1);
 }
 
 TEST(SamplePatterns, seams_of_the_skirt_fit) {
@@ -284,7 +302,8 @@ TEST(SamplePatterns, seams_of_the_skirt_fit) {
     EXPECT_NEAR(length(panels, panel, {"dart1_side"}), length(panels, panel, {"dart1_centre"}), 0.02);
     EXPECT_NEAR(length(panels, panel, {"dart2_side"}), length(panels, panel, {"dart2_centre"}), 0.02);
   }
-  const double waist = 2 * (length(panels, "front", {"waist_side", "waist_middle", "waist_centre"}) + length(panels, "back", {"waist_side", "waist_middle", "waist_centre"}));
+  const double waist = 2 * (length(panels, "front", {"waist_side", "waist_middle", "waist_centre"}) +
+                            length(panels, "back", {"waist_side", "waist_middle", "waist_centre"}));
   EXPECT_NEAR(waist, 761.4, 0.1);
   EXPECT_NEAR(length(panels, "waistband", {"lower", "lower_m"}), 757.57, 0.01);
 }

@@ -70,7 +70,8 @@ TEST(CutPanels, a_piece_on_the_fold_is_unfolded) {
   expect_closed_and_counter_clockwise(front);
   EXPECT_EQ(front.name, "front");
   EXPECT_EQ(front.material, "jersey");
-  EXPECT_EQ(edge_names(front), (std::vector<std::string>{"hem", "side", "shoulder", "neck", "neck_m", "shoulder_m", "side_m", "hem_m"}));
+  EXPECT_EQ(edge_names(front),
+            (std::vector<std::string>{"hem", "side", "shoulder", "neck", "neck_m", "shoulder_m", "side_m", "hem_m"}));
   // Points on the fold stay single; the others have a twin.
   EXPECT_EQ(find_edge(front, "hem")->from, "a");
   EXPECT_EQ(find_edge(front, "hem_m")->to, "a");
@@ -179,7 +180,9 @@ struct MustFail {
   const char* code;
   const char* item;
 };
-void PrintTo(const MustFail& row, std::ostream* out) { *out << row.name; }
+void PrintTo(const MustFail& row, std::ostream* out) {
+  *out << row.name;
+}
 
 class PatternMustFail : public testing::TestWithParam<MustFail> {};
 
@@ -205,30 +208,39 @@ TEST_P(PatternMustFail, says_what_and_where) {
 INSTANTIATE_TEST_SUITE_P(
     Rows, PatternMustFail,
     testing::Values(
-        MustFail{"open", half_front, "- {name: shoulder, path: [c, d]}\n", "- {name: shoulder, path: [c, pocket]}\n", "open_outline", "front.shoulder"},
-        MustFail{"missing_edge", half_front, "      - {name: shoulder, path: [c, d]}\n", "", "open_outline", "front.side"},
+        MustFail{"open", half_front, "- {name: shoulder, path: [c, d]}\n", "- {name: shoulder, path: [c, pocket]}\n",
+                 "open_outline", "front.shoulder"},
+        MustFail{"missing_edge", half_front, "      - {name: shoulder, path: [c, d]}\n", "", "open_outline",
+                 "front.side"},
         MustFail{"crossing", half_front, "c: [90, 150]", "c: [-30, 150]", "self_crossing", "front.centre"},
-        MustFail{"crossing_curve", half_front, "[[110, 50], [80, 100]]", "[[-900, 50], [80, 100]]", "self_crossing", "front.centre"},
-        MustFail{"curve_crosses_itself", half_front, "[[110, 50], [80, 100]]", "[[250, 225], [250, -75]]", "self_crossing", "front.side"},
+        MustFail{"crossing_curve", half_front, "[[110, 50], [80, 100]]", "[[-900, 50], [80, 100]]", "self_crossing",
+                 "front.centre"},
+        MustFail{"curve_crosses_itself", half_front, "[[110, 50], [80, 100]]", "[[250, 225], [250, -75]]",
+                 "self_crossing", "front.side"},
         MustFail{"turns_back", half_front, "path: [a, b]", "path: [a, [150, 0], b]", "self_crossing", "front.hem"},
-        MustFail{"touches", half_front, "path: [a, b]", "path: [a, [30, 0], d, [60, 0], b]", "self_crossing", "front.hem"},
+        MustFail{"touches", half_front, "path: [a, b]", "path: [a, [30, 0], d, [60, 0], b]", "self_crossing",
+                 "front.hem"},
         MustFail{"zero_segment", half_front, "path: [a, b]", "path: [a, a, b]", "zero_length_edge", "front.hem"},
         MustFail{"notch_distance", half_front, "distance: 60", "distance: 600", "notch_off_border", "front.waist"},
         MustFail{"notch_point", half_front, "distance: 60", "point: pocket", "notch_off_border", "front.waist"},
         MustFail{"notch_fraction", half_front, "distance: 60", "fraction: 1.2", "notch_off_border", "front.waist"},
-        MustFail{"notch_edge", half_front, "{edge: side, distance: 60}", "{edge: syde, distance: 60}", "unknown_edge", "front.waist"},
+        MustFail{"notch_edge", half_front, "{edge: side, distance: 60}", "{edge: syde, distance: 60}", "unknown_edge",
+                 "front.waist"},
         MustFail{"notch_unknown_point", half_front, "distance: 60", "point: nowhere", "unknown_point", "front.waist"},
         MustFail{"notch_twice", half_front, "distance: 60", "distance: 60, fraction: 0.5", "bad_notch", "front.waist"},
         MustFail{"notch_unplaced", half_front, ", distance: 60", "", "bad_notch", "front.waist"},
-        MustFail{"fold_curved", half_front, "path: [e, a]", "path: [e, {curve: [[5, 100]]}, a]", "fold_not_straight", "front.centre"},
+        MustFail{"fold_curved", half_front, "path: [e, a]", "path: [e, {curve: [[5, 100]]}, a]", "fold_not_straight",
+                 "front.centre"},
         MustFail{"fold_unknown", half_front, "fold: centre", "fold: center", "unknown_edge", "front.fold"},
         MustFail{"across_fold", half_front, "d: [40, 200]", "d: [-40, 200]", "piece_across_fold", "front.centre"},
         MustFail{"edge_twice", half_front, "{name: shoulder,", "{name: side,", "duplicate_name", "front.side"},
         MustFail{"line_like_edge", half_front, "chest: {", "side: {", "duplicate_name", "front.side"},
         MustFail{"suffix_taken", half_front, "{name: shoulder,", "{name: side_m,", "duplicate_name", "front.side_m"},
         MustFail{"bad_edge_name", half_front, "{name: shoulder,", "{name: a.b,", "bad_name", "front.a.b"},
-        MustFail{"line_outside", half_front, "[[0, 120], [80, 120]]", "[[0, 120], [180, 120]]", "line_outside", "front.chest"},
-        MustFail{"line_zero", half_front, "[[0, 120], [80, 120]]", "[[0, 120], [0, 120]]", "zero_length_line", "front.chest"},
+        MustFail{"line_outside", half_front, "[[0, 120], [80, 120]]", "[[0, 120], [180, 120]]", "line_outside",
+                 "front.chest"},
+        MustFail{"line_zero", half_front, "[[0, 120], [80, 120]]", "[[0, 120], [0, 120]]", "zero_length_line",
+                 "front.chest"},
         MustFail{"mark_outside", half_front, "at: [50, 100]", "at: [150, 100]", "mark_outside", "front.drill"},
         MustFail{"allowance", half_front, "path: [a, b]", "path: [a, b], allowance: -3", "bad_allowance", "front.hem"},
         MustFail{"no_area", half_front, "e: [0, 180]", "e: [0, 0]", "zero_length_edge", "front.centre"},
@@ -236,7 +248,8 @@ INSTANTIATE_TEST_SUITE_P(
         MustFail{"zero_grain", sleeve, "[[0, 10], [0, 0]]", "[[0, 10], [0, 10]]", "grain_zero", "sleeve.grain"},
         MustFail{"hole_outside", sleeve, "low: [0, 25]", "low: [0, 35]", "hole_outside", "sleeve.dart"},
         MustFail{"hole_crosses", sleeve, "[[-2, 20]]", "[[2, 20]]", "self_crossing", "sleeve.dart_left"},
-        MustFail{"hole_open", sleeve, "high, {curve: [[2, 20]]}, low", "high, {curve: [[2, 20]]}, wrist_back", "open_outline", "sleeve.dart_right"}),
+        MustFail{"hole_open", sleeve, "high, {curve: [[2, 20]]}, low", "high, {curve: [[2, 20]]}, wrist_back",
+                 "open_outline", "sleeve.dart_right"}),
     [](const auto& info) { return std::string(info.param.name); });
 
 TEST(PatternCheck, reports_everything_at_once) {
@@ -247,7 +260,10 @@ TEST(PatternCheck, reports_everything_at_once) {
 }
 
 TEST(PatternCheck, panel_names_may_not_clash) {
-  const std::string yaml = with(sleeve, "pieces:\n", "pieces:\n  sleeve_m:\n    grain: [a, c]\n    points: {a: [0, 0], b: [1, 0], c: [0, 1]}\n    outline: [{name: x, path: [a, b]}, {name: y1, path: [b, c]}, {name: z, path: [c, a]}]\n");
+  const std::string yaml =
+      with(sleeve, "pieces:\n",
+           "pieces:\n  sleeve_m:\n    grain: [a, c]\n    points: {a: [0, 0], b: [1, 0], c: [0, 1]}\n    outline: "
+           "[{name: x, path: [a, b]}, {name: y1, path: [b, c]}, {name: z, path: [c, a]}]\n");
   const Issues issues = check(parse(yaml));
   ASSERT_EQ(issues.size(), 1u);
   EXPECT_EQ(issues[0].code, "duplicate_name");
@@ -284,7 +300,8 @@ TEST(SplitEdge, at_a_named_point_near_the_curve) {
   EXPECT_EQ(split->outline[0].to, "tip");
   EXPECT_EQ(split->outline[1].from, "tip");
   EXPECT_EQ(split->points.at("tip"), split->outline[0].segments.back().to);
-  EXPECT_NEAR(Curve(split->outline[0].segments).length() + Curve(split->outline[1].segments).length(), cap.length(), 1e-10);
+  EXPECT_NEAR(Curve(split->outline[0].segments).length() + Curve(split->outline[1].segments).length(), cap.length(),
+              1e-10);
   // The notch at a quarter of the whole is at half of the first part.
   EXPECT_EQ(split->notches[0].edge, "cap_back");
   EXPECT_NEAR(*split->notches[0].distance, 0.25 * cap.length(), 1e-12);
@@ -294,7 +311,8 @@ TEST(SplitEdge, at_a_named_point_near_the_curve) {
 
 TEST(SplitEdge, at_a_distance_and_on_a_hole) {
   const Pattern pattern = parse(sleeve);
-  const auto split = split_edge(pattern.pieces[0], pattern.units, "dart_left", {.point = "middle", .distance = -4.0}, "low_part", "high_part");
+  const auto split = split_edge(pattern.pieces[0], pattern.units, "dart_left", {.point = "middle", .distance = -4.0},
+                                "low_part", "high_part");
   ASSERT_TRUE(split);
   EXPECT_EQ(split->holes[0].edges.size(), 3u);
   EXPECT_NEAR(Curve(split->holes[0].edges[1].segments).length(), 4, 1e-12);

@@ -25,7 +25,8 @@ TEST(PatternYaml, reads_what_is_written) {
   EXPECT_EQ(front.fold, "centre");
   EXPECT_FALSE(front.grain);
   ASSERT_EQ(front.outline.size(), 5u);
-  EXPECT_EQ(front.outline[1].segments, (std::vector<Segment>{cubic_segment({100, 0}, {110, 50}, {80, 100}, {90, 150})}));
+  EXPECT_EQ(front.outline[1].segments,
+            (std::vector<Segment>{cubic_segment({100, 0}, {110, 50}, {80, 100}, {90, 150})}));
   EXPECT_EQ(front.outline[3].segments[0].kind, Segment::Kind::arc);
   EXPECT_EQ(front.lines[0].kind, LineKind::placement);
   EXPECT_EQ(front.notches[0].distance, 60.0);
@@ -53,7 +54,10 @@ TEST(PatternYaml, lengths_may_carry_a_unit) {
 TEST(PatternYaml, arcs_by_radius_turn_as_seen_on_the_drawing) {
   // Up the page with a turn to the left: the arc bulges to the right.
   const auto arc = [](const char* axis, const char* top, const char* text) {
-    const std::string yaml = fmt::format("units: m\ny: {}\npieces:\n  p:\n    grain: [a, b]\n    points: {{a: [0, 0], b: [0, {}]}}\n    outline:\n      - {{name: e, path: [a, {{arc: {{{}}}}}, b]}}\n      - {{name: f, path: [b, [-3, 0], a]}}\n", axis, top, text);
+    const std::string yaml = fmt::format(
+        "units: m\ny: {}\npieces:\n  p:\n    grain: [a, b]\n    points: {{a: [0, 0], b: [0, {}]}}\n    outline:\n      "
+        "- {{name: e, path: [a, {{arc: {{{}}}}}, b]}}\n      - {{name: f, path: [b, [-3, 0], a]}}\n",
+        axis, top, text);
     const auto pattern = io::parse_pattern(yaml, "test.yaml");
     EXPECT_TRUE(pattern) << (pattern ? "" : to_string(pattern.issues().front()));
     return pattern->pieces[0].outline[0].segments[0];
@@ -76,7 +80,9 @@ struct BadText {
   int line;
   int column;  ///< 0: any
 };
-void PrintTo(const BadText& row, std::ostream* out) { *out << row.name; }
+void PrintTo(const BadText& row, std::ostream* out) {
+  *out << row.name;
+}
 class PatternYamlMustFail : public testing::TestWithParam<BadText> {};
 
 TEST_P(PatternYamlMustFail, says_where) {
@@ -140,7 +146,8 @@ TEST(PatternYaml, all_issues_of_a_file_at_once) {
 }
 
 TEST(PatternYaml, other_things_than_a_pattern) {
-  for (const char* text : {"", "[]", "42", "units: mm\n---\nunits: mm\n", "pieces: 3\nunits: mm\ny: up\n", "{", "units: mm\ny: up\npieces: {p: }\n", "units: mm\ny: up\npieces: {[1]: 2}\n"}) {
+  for (const char* text : {"", "[]", "42", "units: mm\n---\nunits: mm\n", "pieces: 3\nunits: mm\ny: up\n", "{",
+                           "units: mm\ny: up\npieces: {p: }\n", "units: mm\ny: up\npieces: {[1]: 2}\n"}) {
     const auto file = io::parse_pattern_file(text, "test.yaml");
     ASSERT_FALSE(file) << text;
     EXPECT_EQ(file.issues().front().place.file, "test.yaml");
@@ -150,7 +157,8 @@ TEST(PatternYaml, other_things_than_a_pattern) {
 TEST(PatternYaml, texts_survive) {
   auto pattern = io::parse_pattern(half_front, "test.yaml");
   ASSERT_TRUE(pattern);
-  for (const char* text : {"yes", "a: b", "tab\tnew\nline", "quote \" and \\", "# no comment", " led by a space", "ends in a space ", "tr\xc3\xa4gt", "1e3", "x\x01y"}) {
+  for (const char* text : {"yes", "a: b", "tab\tnew\nline", "quote \" and \\", "# no comment", " led by a space",
+                           "ends in a space ", "tr\xc3\xa4gt", "1e3", "x\x01y"}) {
     pattern->origin = text;
     const auto again = io::parse_pattern(io::format_pattern(*pattern), "written.yaml");
     ASSERT_TRUE(again) << text;

@@ -1,12 +1,11 @@
-#include "toile/base/text.h"
-#include "toile/io/pattern_import.h"
-
-#include <nlohmann/json.hpp>
-
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <set>
+
+#include "toile/base/text.h"
+#include "toile/io/pattern_import.h"
 
 namespace toile::io {
 namespace {
@@ -79,7 +78,8 @@ class DraftReader {
     need(units == "mm", "units", "mm");
     for (const auto& [name, part] : root["parts"].items()) {
       draft.parts.push_back(read_part(name, part));
-      if (root.contains("cutlist") && root["cutlist"].is_object() && root["cutlist"].contains(name)) read_cuts(root["cutlist"][name], draft.parts.back());
+      if (root.contains("cutlist") && root["cutlist"].is_object() && root["cutlist"].contains(name))
+        read_cuts(root["cutlist"][name], draft.parts.back());
     }
     return draft;
   }
@@ -103,7 +103,9 @@ class DraftReader {
   static DraftPart read_part(const std::string& name, const ordered_json& j) {
     DraftPart part;
     part.name = name;
-    need(j.is_object() && j.contains("points") && j["points"].is_object() && j.contains("paths") && j["paths"].is_object(), name, "an object with points and paths");
+    need(j.is_object() && j.contains("points") && j["points"].is_object() && j.contains("paths") &&
+             j["paths"].is_object(),
+         name, "an object with points and paths");
     for (const auto& [id, p] : j["points"].items()) part.points.emplace_back(id, point(p, name + "." + id));
     for (const auto& [id, path] : j["paths"].items()) {
       part.paths.emplace_back(id, read_path(path, name + "." + id));
@@ -115,8 +117,10 @@ class DraftReader {
       for (const auto& snippet : j[key]) {
         need(snippet.is_object() && snippet.contains("at"), name + "." + key, "objects with 'at'");
         const Point2 at = point(snippet["at"], name + "." + key);
-        if (key[0] == 'n') part.notches.push_back(at);
-        else part.buttons.emplace_back(snippet.value("def", "button"), at);
+        if (key[0] == 'n')
+          part.notches.push_back(at);
+        else
+          part.buttons.emplace_back(snippet.value("def", "button"), at);
       }
     }
     if (j.contains("grainline") && j["grainline"].is_array() && j["grainline"].size() == 2) {
@@ -127,7 +131,8 @@ class DraftReader {
 
   static DraftPath read_path(const ordered_json& j, const std::string& where) {
     DraftPath path;
-    need(j.is_object() && j.contains("segments") && j["segments"].is_array(), where, "an object with a list of segments");
+    need(j.is_object() && j.contains("segments") && j["segments"].is_array(), where,
+         "an object with a list of segments");
     std::optional<Point2> start, last;
     for (const auto& s : j["segments"]) {
       need(s.is_object() && s.contains("type") && s["type"].is_string(), where, "segments with a type");
@@ -141,8 +146,10 @@ class DraftReader {
       need(last.has_value(), where, "a move before any other segment");
       const Point2 to = type == "close" ? *start : point(s.at("to"), where);
       Segment segment = pattern::line_segment(*last, to);
-      if (type == "cubic") segment = pattern::cubic_segment(*last, point(s.at("cp1"), where), point(s.at("cp2"), where), to);
-      const double size = (to - *last).norm() + (type == "cubic" ? (segment.control_1 - *last).norm() + (segment.control_2 - to).norm() : 0);
+      if (type == "cubic")
+        segment = pattern::cubic_segment(*last, point(s.at("cp1"), where), point(s.at("cp2"), where), to);
+      const double size = (to - *last).norm() +
+                          (type == "cubic" ? (segment.control_1 - *last).norm() + (segment.control_2 - to).norm() : 0);
       if (size > same_place) path.strokes.back().push_back(segment);
       last = to;
     }
@@ -204,13 +211,19 @@ class PieceImport {
     }
     if (!issues_.empty()) return issues_;
     for (const ImportSplit& split : spec_.splits) {
-      auto result = pattern::split_edge(piece_, pattern::LengthUnit::mm, split.edge, {.point = split.point, .distance = split.distance * 1e3}, split.first, split.second);
-      if (result) piece_ = std::move(*result);
-      else append(issues_, result.issues());
+      auto result =
+          pattern::split_edge(piece_, pattern::LengthUnit::mm, split.edge,
+                              {.point = split.point, .distance = split.distance * 1e3}, split.first, split.second);
+      if (result)
+        piece_ = std::move(*result);
+      else
+        append(issues_, result.issues());
     }
     for (const std::string& name : spec_.points) {
-      if (const Point2* p = part_.find(name)) piece_.points.try_emplace(final_name(name), *p);
-      else unknown_point("points", name);
+      if (const Point2* p = part_.find(name))
+        piece_.points.try_emplace(final_name(name), *p);
+      else
+        unknown_point("points", name);
     }
     import_grain();
     import_lines();
@@ -223,16 +236,23 @@ class PieceImport {
 
  private:
   /// A gap in the draft: an issue, or a note with what is assumed.
-  void gap(const char* code, const std::string& what_part, const std::string& what, const std::string& remedy, const std::string& assumption) {
+  void gap(const char* code, const std::string& what_part, const std::string& what, const std::string& remedy,
+           const std::string& assumption) {
     const Place place{.file = file_, .item = spec_.name + "." + what_part};
-    if (gaps_ == Gaps::error) issues_.push_back(Issue{code, place, what, remedy});
-    else assumed_.push_back(Issue{code, place, what + ": " + assumption, remedy});
+    if (gaps_ == Gaps::error)
+      issues_.push_back(Issue{code, place, what, remedy});
+    else
+      assumed_.push_back(Issue{code, place, what + ": " + assumption, remedy});
   }
   void report(const char* code, const std::string& what_part, std::string what, std::string remedy) {
-    issues_.push_back(Issue{code, {.file = file_, .item = what_part.empty() ? spec_.name : spec_.name + "." + what_part}, std::move(what), std::move(remedy)});
+    issues_.push_back(Issue{code,
+                            {.file = file_, .item = what_part.empty() ? spec_.name : spec_.name + "." + what_part},
+                            std::move(what),
+                            std::move(remedy)});
   }
   void unknown_point(const std::string& where, const std::string& name) {
-    report("unknown_point", where, fmt::format("part '{}' has no point '{}'", part_.name, name), suggestion(name, part_.point_names()));
+    report("unknown_point", where, fmt::format("part '{}' has no point '{}'", part_.name, name),
+           suggestion(name, part_.point_names()));
   }
   std::string final_name(const std::string& drafted) const {
     const auto it = spec_.rename.find(drafted);
@@ -259,7 +279,9 @@ class PieceImport {
     } else if (!spec_.material.empty() && !part_.cuts.empty()) {
       std::vector<std::string> materials;
       for (const DraftPart::Cut& cut : part_.cuts) materials.push_back(cut.material);
-      report("unknown_material", "material", fmt::format("the cut list of '{}' has no material '{}'", part_.name, spec_.material), suggestion(spec_.material, materials));
+      report("unknown_material", "material",
+             fmt::format("the cut list of '{}' has no material '{}'", part_.name, spec_.material),
+             suggestion(spec_.material, materials));
     }
     if (spec_.cut) piece_.copies = *spec_.cut;
     if (spec_.identical) piece_.identical = *spec_.identical;
@@ -271,7 +293,9 @@ class PieceImport {
     std::vector<std::string> closed;
     for (const std::string& name : part_.drawn) {
       const DraftPath* path = part_.path(name);
-      if (name.rfind("sa", 0) != 0 && path->strokes.size() == 1 && (path->strokes[0].front().from - path->strokes[0].back().to).norm() <= same_place) closed.push_back(name);
+      if (name.rfind("sa", 0) != 0 && path->strokes.size() == 1 &&
+          (path->strokes[0].front().from - path->strokes[0].back().to).norm() <= same_place)
+        closed.push_back(name);
     }
     return closed.size() == 1 ? closed.front() : "seam";
   }
@@ -279,7 +303,8 @@ class PieceImport {
   std::optional<Loop> closed_path(const std::string& name) {
     const DraftPath* path = part_.path(name);
     if (!path) {
-      report("unknown_path", name, fmt::format("part '{}' has no path '{}'", part_.name, name), suggestion(name, part_.path_names()));
+      report("unknown_path", name, fmt::format("part '{}' has no path '{}'", part_.name, name),
+             suggestion(name, part_.path_names()));
       return std::nullopt;
     }
     if (path->strokes.size() != 1 || (path->strokes[0].front().from - path->strokes[0].back().to).norm() > same_place) {
@@ -320,7 +345,9 @@ class PieceImport {
     const Curve curve = loop.curve();
     const Curve::Nearest nearest = curve.nearest(*p);
     if (nearest.distance > tolerance_) {
-      report("run_off_outline", where, fmt::format("point '{}' is {:.4g} mm away from the line", name, nearest.distance), "name a point that lies on it, or raise the tolerance");
+      report("run_off_outline", where,
+             fmt::format("point '{}' is {:.4g} mm away from the line", name, nearest.distance),
+             "name a point that lies on it, or raise the tolerance");
       return false;
     }
     const auto& starts = curve.segment_starts();
@@ -347,18 +374,23 @@ class PieceImport {
 
   void take_shortcut(Loop& loop, const std::string& text) {
     const std::vector<std::string> names = run_points(text);
-    if (names.size() != 2) return report("bad_run", "shortcuts", fmt::format("'{}' is no shortcut", text), "write two points: a>b");
+    if (names.size() != 2)
+      return report("bad_run", "shortcuts", fmt::format("'{}' is no shortcut", text), "write two points: a>b");
     if (!insert_node(loop, names[0], "shortcuts") || !insert_node(loop, names[1], "shortcuts")) return;
     const std::size_t a = *node_of(loop, names[0]), b = *node_of(loop, names[1]);
-    if (a == b) return report("bad_run", "shortcuts", fmt::format("'{}' starts and ends at the same point", text), "write two points: a>b");
+    if (a == b)
+      return report("bad_run", "shortcuts", fmt::format("'{}' starts and ends at the same point", text),
+                    "write two points: a>b");
     std::vector<Segment> kept{pattern::line_segment(loop.node(a), loop.node(b))};
     for (std::size_t i = b; i != a; i = (i + 1) % loop.size()) kept.push_back(loop.segments[i]);
-    if (kept.size() < 2) return report("bad_run", "shortcuts", fmt::format("'{}' leaves nothing of the outline", text), "swap its points");
+    if (kept.size() < 2)
+      return report("bad_run", "shortcuts", fmt::format("'{}' leaves nothing of the outline", text), "swap its points");
     loop.segments = std::move(kept);
   }
 
   /// Nodes i0, i1, … of a run on the loop, walking in its direction; empty with an issue if it does not fit.
-  std::optional<std::pair<std::size_t, std::size_t>> locate_run(const Loop& loop, const std::string& edge, const std::string& run) {
+  std::optional<std::pair<std::size_t, std::size_t>> locate_run(const Loop& loop, const std::string& edge,
+                                                                const std::string& run) {
     const std::vector<std::string> names = run_points(run);
     if (names.size() < 2) {
       report("bad_run", edge, fmt::format("'{}' is no run of points", run), "write at least two points: a>b");
@@ -374,13 +406,15 @@ class PieceImport {
     // Steps from the first node to the last when every node between is met in order; 0: it is not.
     const auto walk = [&](const std::vector<std::size_t>& stops) -> std::size_t {
       std::size_t steps = 0;
-      for (std::size_t i = 0; i + 1 < stops.size(); ++i) steps += (stops[i + 1] + n - stops[i]) % n == 0 ? n : (stops[i + 1] + n - stops[i]) % n;
+      for (std::size_t i = 0; i + 1 < stops.size(); ++i)
+        steps += (stops[i + 1] + n - stops[i]) % n == 0 ? n : (stops[i + 1] + n - stops[i]) % n;
       return steps <= n && (steps < n || stops.front() == stops.back()) ? steps : 0;
     };
     const std::vector<std::size_t> back(nodes.rbegin(), nodes.rend());
     const std::size_t forwards = walk(nodes), backwards = walk(back);
     if (forwards == 0 && backwards == 0) {
-      report("bad_run", edge, fmt::format("the points of '{}' do not follow each other on the outline", run), "list them in order");
+      report("bad_run", edge, fmt::format("the points of '{}' do not follow each other on the outline", run),
+             "list them in order");
       return std::nullopt;
     }
     if (forwards == backwards) {
@@ -392,7 +426,8 @@ class PieceImport {
   }
 
   std::string node_name(const Point2& p) {
-    const auto it = std::find_if(piece_.points.begin(), piece_.points.end(), [&](const auto& entry) { return entry.second == p; });
+    const auto it =
+        std::find_if(piece_.points.begin(), piece_.points.end(), [&](const auto& entry) { return entry.second == p; });
     if (it != piece_.points.end()) return it->first;
     // Names that the spec uses come before others, helpers of the drawing last.
     std::string best;
@@ -400,16 +435,21 @@ class PieceImport {
     for (const auto& [name, at] : part_.points) {
       const auto moved = moved_.find(name);
       if (((moved != moved_.end() ? moved->second : at) - p).norm() > same_place) continue;
-      const int rank = spec_.rename.count(name) ? 0 : used_.count(name) ? 1 : name.rfind("gridAnchor", 0) == 0 || name == "anchor" || name.front() == '_' ? 3 : 2;
+      const int rank = spec_.rename.count(name)                                                      ? 0
+                       : used_.count(name)                                                           ? 1
+                       : name.rfind("gridAnchor", 0) == 0 || name == "anchor" || name.front() == '_' ? 3
+                                                                                                     : 2;
       if (rank < best_rank) best = name, best_rank = rank;
     }
     std::string name = best.empty() ? "" : final_name(best);
-    for (int i = 1; name.empty() || (piece_.points.count(name) && piece_.points[name] != p); ++i) name = fmt::format("{}{}", best.empty() ? "p" : final_name(best) + "_", i);
+    for (int i = 1; name.empty() || (piece_.points.count(name) && piece_.points[name] != p); ++i)
+      name = fmt::format("{}{}", best.empty() ? "p" : final_name(best) + "_", i);
     piece_.points[name] = p;
     return name;
   }
 
-  std::vector<pattern::Edge> name_edges(const Loop& loop, const std::map<std::string, std::string>& runs, bool is_outline) {
+  std::vector<pattern::Edge> name_edges(const Loop& loop, const std::map<std::string, std::string>& runs,
+                                        bool is_outline) {
     const std::size_t n = loop.size();
     for (const auto& [edge, run] : runs) {
       for (const std::string& name : run_points(run)) used_.insert(name);
@@ -424,7 +464,10 @@ class PieceImport {
       for (std::size_t k = 0; k < count; ++k) {
         std::string& name = owner[(start + k) % n];
         if (!name.empty()) {
-          report("edges_overlap", edge, fmt::format("it shares a part of the outline with edge '{}', from '{}'", name, node_name(loop.node((start + k) % n))), "let edges meet at their ends");
+          report("edges_overlap", edge,
+                 fmt::format("it shares a part of the outline with edge '{}', from '{}'", name,
+                             node_name(loop.node((start + k) % n))),
+                 "let edges meet at their ends");
           break;
         }
         name = edge;
@@ -469,11 +512,15 @@ class PieceImport {
     }
     const bool folded = part_.fold && (on_fold_ || piece_.copies == 1);
     if (!folded) {
-      if (!spec_.fold.empty()) report("unknown_edge", "fold", fmt::format("there is no edge '{}', and the draft has no fold", spec_.fold), "name an edge among 'edges', or none");
+      if (!spec_.fold.empty())
+        report("unknown_edge", "fold", fmt::format("there is no edge '{}', and the draft has no fold", spec_.fold),
+               "name an edge among 'edges', or none");
       return;
     }
     const Point2 a = part_.fold->first, d = (part_.fold->second - a).normalized();
-    const auto on_line = [&](const Point2& p) { return std::abs(d.x() * (p - a).y() - d.y() * (p - a).x()) <= same_place * 10; };
+    const auto on_line = [&](const Point2& p) {
+      return std::abs(d.x() * (p - a).y() - d.y() * (p - a).x()) <= same_place * 10;
+    };
     std::vector<bool> on(n);
     for (std::size_t i = 0; i < n; ++i) {
       const Segment& s = loop.segments[i];
@@ -485,7 +532,8 @@ class PieceImport {
     }
     if (start == n) {
       if (!on_fold_) return;
-      gap("no_fold_edge", "fold", "the cut list puts the part on the fold, but no edge lies on the fold line", "write fold: none and how often it is cut", "cut twice, mirrored, instead");
+      gap("no_fold_edge", "fold", "the cut list puts the part on the fold, but no edge lies on the fold line",
+          "write fold: none and how often it is cut", "cut twice, mirrored, instead");
       if (piece_.copies == 1) piece_.copies = 2;
       return;
     }
@@ -506,11 +554,15 @@ class PieceImport {
     } else if (spec_.grain == "y") {
       grain = {Point2(0, 100), Point2(0, 0)};
     } else if (spec_.grain == "fold") {
-      if (!piece_.fold) report("no_fold_edge", "grain", "the grain follows the fold, but the piece has none", "name the fold, or another grain");
+      if (!piece_.fold)
+        report("no_fold_edge", "grain", "the grain follows the fold, but the piece has none",
+               "name the fold, or another grain");
       return;
     } else if (!spec_.grain.empty()) {
       const std::vector<std::string> names = run_points(spec_.grain);
-      if (names.size() != 2) return report("bad_run", "grain", fmt::format("'{}' is no grain", spec_.grain), "write x, y, fold or two points a>b");
+      if (names.size() != 2)
+        return report("bad_run", "grain", fmt::format("'{}' is no grain", spec_.grain),
+                      "write x, y, fold or two points a>b");
       for (const std::string& name : names) {
         if (!part_.find(name)) return unknown_point("grain", name);
       }
@@ -522,7 +574,8 @@ class PieceImport {
       if (d.y() > 0 || (d.y() == 0 && d.x() < 0)) std::swap(grain->first, grain->second);
     } else {
       if (part_.grain_is_fold && piece_.fold) return;
-      gap("grain_missing", "grain", "the draft has no grain line for it", "write grain: x, y, fold or two points a>b", "up the page is assumed");
+      gap("grain_missing", "grain", "the draft has no grain line for it", "write grain: x, y, fold or two points a>b",
+          "up the page is assumed");
       if (gaps_ == Gaps::error) return;
       grain = {Point2(0, 100), Point2(0, 0)};
     }
@@ -548,10 +601,12 @@ class PieceImport {
       }
       const DraftPath* path = part_.path(line.path);
       if (!path) {
-        report("unknown_path", name, fmt::format("part '{}' has no path '{}'", part_.name, line.path), suggestion(line.path, part_.path_names()));
+        report("unknown_path", name, fmt::format("part '{}' has no path '{}'", part_.name, line.path),
+               suggestion(line.path, part_.path_names()));
         continue;
       }
-      for (std::size_t i = 0; i < path->strokes.size(); ++i) piece_.lines.push_back({i == 0 ? name : fmt::format("{}_{}", name, i + 1), line.kind, path->strokes[i]});
+      for (std::size_t i = 0; i < path->strokes.size(); ++i)
+        piece_.lines.push_back({i == 0 ? name : fmt::format("{}_{}", name, i + 1), line.kind, path->strokes[i]});
     }
   }
 
@@ -564,7 +619,9 @@ class PieceImport {
   template <class Items>
   static std::string unused(const Items& items, const std::string& wanted) {
     std::string name = wanted;
-    const auto taken = [&](const std::string& n) { return std::any_of(items.begin(), items.end(), [&](const auto& item) { return item.name == n; }); };
+    const auto taken = [&](const std::string& n) {
+      return std::any_of(items.begin(), items.end(), [&](const auto& item) { return item.name == n; });
+    };
     for (int i = 2; taken(name); ++i) name = fmt::format("{}_{}", wanted, i);
     return name;
   }
@@ -590,7 +647,8 @@ class PieceImport {
       const auto look = [&](const std::vector<pattern::Edge>& edges) {
         for (const pattern::Edge& edge : edges) {
           const Curve::Nearest nearest = Curve(edge.segments).nearest(at);
-          if (nearest.distance <= distance && (!best || nearest.distance < distance)) best = &edge, distance = nearest.distance;
+          if (nearest.distance <= distance && (!best || nearest.distance < distance))
+            best = &edge, distance = nearest.distance;
         }
       };
       look(piece_.outline);
@@ -601,17 +659,27 @@ class PieceImport {
       } else if (on_piece(at)) {
         piece_.marks.push_back({unused(piece_.marks, name), pattern::MarkKind::drill, at});
       } else {
-        notes.push_back(Issue{"notch_left_out", {.file = file_, .item = spec_.name + "." + name}, fmt::format("the notch at ({:.6g}, {:.6g}) is not on the piece", at.x(), at.y()), ""});
+        notes.push_back(Issue{"notch_left_out",
+                              {.file = file_, .item = spec_.name + "." + name},
+                              fmt::format("the notch at ({:.6g}, {:.6g}) is not on the piece", at.x(), at.y()),
+                              ""});
       }
     }
   }
 
   void import_buttons(Issues& notes) {
     for (const auto& [def, at] : part_.buttons) {
-      const pattern::MarkKind kind = def.rfind("buttonhole", 0) == 0 ? pattern::MarkKind::buttonhole : def.rfind("snap", 0) == 0 ? pattern::MarkKind::snap : pattern::MarkKind::button;
+      const pattern::MarkKind kind = def.rfind("buttonhole", 0) == 0 ? pattern::MarkKind::buttonhole
+                                     : def.rfind("snap", 0) == 0     ? pattern::MarkKind::snap
+                                                                     : pattern::MarkKind::button;
       const std::string name = drafted_name(at, "button") + (kind == pattern::MarkKind::buttonhole ? "_hole" : "");
-      if (on_piece(at)) piece_.marks.push_back({unused(piece_.marks, name), kind, at});
-      else notes.push_back(Issue{"button_left_out", {.file = file_, .item = spec_.name + "." + name}, fmt::format("the {} at ({:.6g}, {:.6g}) is not on the piece", def, at.x(), at.y()), ""});
+      if (on_piece(at))
+        piece_.marks.push_back({unused(piece_.marks, name), kind, at});
+      else
+        notes.push_back(Issue{"button_left_out",
+                              {.file = file_, .item = spec_.name + "." + name},
+                              fmt::format("the {} at ({:.6g}, {:.6g}) is not on the piece", def, at.x(), at.y()),
+                              ""});
     }
   }
 
@@ -652,18 +720,26 @@ Result<ImportedPattern> import_freesewing(std::string_view json, const std::stri
     const auto before = json.substr(0, std::min(json.size(), e.byte > 0 ? e.byte - 1 : 0));
     const int line = static_cast<int>(std::count(before.begin(), before.end(), '\n')) + 1;
     const std::size_t newline = before.rfind('\n');
-    const int column = static_cast<int>(newline == std::string_view::npos ? before.size() : before.size() - newline - 1) + 1;
-    return Issue{"bad_json", {.file = file, .line = line, .column = column}, "the file is no JSON from here on", "write it again with the program it comes from"};
+    const int column =
+        static_cast<int>(newline == std::string_view::npos ? before.size() : before.size() - newline - 1) + 1;
+    return Issue{"bad_json",
+                 {.file = file, .line = line, .column = column},
+                 "the file is no JSON from here on",
+                 "write it again with the program it comes from"};
   } catch (const ordered_json::exception& e) {
-    return Issue{"bad_draft", {.file = file}, e.what(), "give a draft as samples/patterns/freesewing/draft.mjs writes it"};
+    return Issue{
+        "bad_draft", {.file = file}, e.what(), "give a draft as samples/patterns/freesewing/draft.mjs writes it"};
   } catch (const std::runtime_error& e) {
-    return Issue{"bad_draft", {.file = file}, e.what(), "give a draft as samples/patterns/freesewing/draft.mjs writes it"};
+    return Issue{
+        "bad_draft", {.file = file}, e.what(), "give a draft as samples/patterns/freesewing/draft.mjs writes it"};
   }
 
   Issues issues;
   ImportedPattern result;
   result.pattern.name = params.name.empty() ? draft.design : params.name;
-  result.pattern.origin = !params.origin.empty() ? params.origin : fmt::format("FreeSewing {}{}{}", draft.design, draft.version.empty() ? "" : " ", draft.version);
+  result.pattern.origin = !params.origin.empty() ? params.origin
+                                                 : fmt::format("FreeSewing {}{}{}", draft.design,
+                                                               draft.version.empty() ? "" : " ", draft.version);
   result.pattern.units = pattern::LengthUnit::mm;
   result.pattern.y_down = true;
 
@@ -679,15 +755,21 @@ Result<ImportedPattern> import_freesewing(std::string_view json, const std::stri
   std::vector<std::string> known;
   for (const DraftPart& part : draft.parts) known.push_back(part.name);
   for (const ImportPiece& spec : pieces) {
-    const auto part = std::find_if(draft.parts.begin(), draft.parts.end(), [&](const DraftPart& p) { return p.name == spec.part; });
+    const auto part =
+        std::find_if(draft.parts.begin(), draft.parts.end(), [&](const DraftPart& p) { return p.name == spec.part; });
     if (part == draft.parts.end()) {
-      issues.push_back(Issue{"unknown_part", {.file = file, .item = spec.name}, fmt::format("the draft has no part '{}'", spec.part), suggestion(spec.part, known)});
+      issues.push_back(Issue{"unknown_part",
+                             {.file = file, .item = spec.name},
+                             fmt::format("the draft has no part '{}'", spec.part),
+                             suggestion(spec.part, known)});
       continue;
     }
     const auto gaps = params.pieces.empty() ? PieceImport::Gaps::assume : PieceImport::Gaps::error;
     auto piece = PieceImport(*part, spec, params.tolerance, file, gaps).run(result.notes);
-    if (piece) result.pattern.pieces.push_back(std::move(*piece));
-    else append(issues, piece.issues());
+    if (piece)
+      result.pattern.pieces.push_back(std::move(*piece));
+    else
+      append(issues, piece.issues());
   }
   if (!issues.empty()) return issues;
   issues = pattern::check(result.pattern);

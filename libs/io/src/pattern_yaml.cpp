@@ -1,9 +1,5 @@
 #include "toile/io/pattern_yaml.h"
 
-#include "toile/base/text.h"
-#include "toile/base/units.h"
-#include "toile/io/file.h"
-
 #include <fmt/ranges.h>
 #include <yaml-cpp/yaml.h>
 
@@ -12,6 +8,10 @@
 #include <cmath>
 #include <functional>
 #include <set>
+
+#include "toile/base/text.h"
+#include "toile/base/units.h"
+#include "toile/io/file.h"
 
 namespace toile::io {
 namespace {
@@ -30,7 +30,10 @@ class Reader {
     try {
       const std::vector<YAML::Node> documents = YAML::LoadAll(std::string(yaml));
       if (documents.size() != 1) {
-        return Issue{"bad_yaml", {.file = file_}, fmt::format("the file has {} YAML documents instead of one", documents.size()), "write one mapping with units and pieces"};
+        return Issue{"bad_yaml",
+                     {.file = file_},
+                     fmt::format("the file has {} YAML documents instead of one", documents.size()),
+                     "write one mapping with units and pieces"};
       }
       read_root(documents.front());
     } catch (const YAML::Exception& e) {
@@ -50,12 +53,17 @@ class Reader {
     issues_.push_back(Issue{code, place(node, item), std::move(what), std::move(remedy)});
   }
   void wrong_type(const YAML::Node& node, const std::string& item, const std::string& wanted) {
-    const char* given = node.IsScalar() ? "a single value" : node.IsSequence() ? "a list" : node.IsMap() ? "a mapping" : "nothing";
-    report("wrong_type", node, item, fmt::format("{} stands where {} is needed", given, wanted), fmt::format("write {}", wanted));
+    const char* given = node.IsScalar()     ? "a single value"
+                        : node.IsSequence() ? "a list"
+                        : node.IsMap()      ? "a mapping"
+                                            : "nothing";
+    report("wrong_type", node, item, fmt::format("{} stands where {} is needed", given, wanted),
+           fmt::format("write {}", wanted));
   }
 
   /// The values of a mapping by key, in the order of the file; doubled keys are reported.
-  std::vector<std::pair<std::string, YAML::Node>> entries(const YAML::Node& node, const std::string& item, const std::string& wanted) {
+  std::vector<std::pair<std::string, YAML::Node>> entries(const YAML::Node& node, const std::string& item,
+                                                          const std::string& wanted) {
     std::vector<std::pair<std::string, YAML::Node>> result;
     if (!node.IsMap()) {
       wrong_type(node, item, wanted);
@@ -138,7 +146,8 @@ class Reader {
     return std::nullopt;
   }
   template <std::size_t N>
-  std::optional<std::size_t> choice(const YAML::Node& node, const std::string& item, const std::array<const char*, N>& names) {
+  std::optional<std::size_t> choice(const YAML::Node& node, const std::string& item,
+                                    const std::array<const char*, N>& names) {
     if (!node.IsScalar()) {
       wrong_type(node, item, fmt::format("one of {}", fmt::join(names, ", ")));
       return std::nullopt;
@@ -147,7 +156,8 @@ class Reader {
       if (node.Scalar() == names[i]) return i;
     }
     const std::vector<std::string> known(names.begin(), names.end());
-    report("bad_choice", node, item, fmt::format("'{}' is not known here", node.Scalar()), suggestion(node.Scalar(), known));
+    report("bad_choice", node, item, fmt::format("'{}' is not known here", node.Scalar()),
+           suggestion(node.Scalar(), known));
     return std::nullopt;
   }
   std::optional<Point2> coordinates(const YAML::Node& node, const std::string& item) {
@@ -167,7 +177,8 @@ class Reader {
     if (unreadable_points_.count(piece.name + "." + node.Scalar())) return std::nullopt;  // told where it stands
     std::vector<std::string> names;
     for (const auto& [name, p] : piece.points) names.push_back(name);
-    report("unknown_point", node, item, fmt::format("there is no point '{}'", node.Scalar()), suggestion(node.Scalar(), names));
+    report("unknown_point", node, item, fmt::format("there is no point '{}'", node.Scalar()),
+           suggestion(node.Scalar(), names));
     return std::nullopt;
   }
 
@@ -176,11 +187,18 @@ class Reader {
     fields(root, "", "a mapping with units and pieces",
            {{"name", [&](const YAML::Node& n) { p.name = text(n, "name", "a name").value_or(""); }},
             {"origin", [&](const YAML::Node& n) { p.origin = text(n, "origin", "a text").value_or(""); }},
-            {"units", [&](const YAML::Node& n) { p.units = static_cast<pattern::LengthUnit>(choice(n, "units", unit_names).value_or(0)); }},
-            {"y", [&](const YAML::Node& n) { p.y_down = choice(n, "y", std::array{"up", "down"}).value_or(0) == 1; }},
+            {"units",
+             [&](const YAML::Node& n) {
+               p.units = static_cast<pattern::LengthUnit>(choice(n, "units", unit_names).value_or(0));
+             }},
+            {"y",
+             [&](const YAML::Node& n) {
+               p.y_down = choice(n, "y", std::array{"up", "down"}).value_or(0) == 1;
+             }},
             {"pieces",
              [&](const YAML::Node& n) {
-               for (const auto& [name, node] : entries(n, "pieces", "a mapping of pieces by name")) read_piece(name, node);
+               for (const auto& [name, node] : entries(n, "pieces", "a mapping of pieces by name"))
+                 read_piece(name, node);
              }}},
            {"units", "y", "pieces"});
   }
@@ -190,15 +208,21 @@ class Reader {
     piece.name = name;
     result_.places[name] = place(node, name);
     const auto part = [&](const std::string& what) { return name + "." + what; };
-    const auto remember = [&](const std::string& item, const YAML::Node& n) { result_.places.try_emplace(item, place(n, item)); };
+    const auto remember = [&](const std::string& item, const YAML::Node& n) {
+      result_.places.try_emplace(item, place(n, item));
+    };
     const auto read_lines = [&](const YAML::Node& n) {
       for (const auto& [line, value] : entries(n, part("lines"), "a mapping of lines by name")) {
         const std::string item = part(line);
         remember(item, value);
         pattern::InternalLine internal{.name = line};
         fields(value, item, "{kind: ..., path: [...]}",
-               {{"kind", [&](const YAML::Node& k) { internal.kind = static_cast<pattern::LineKind>(choice(k, item, line_kinds).value_or(5)); }},
-                {"path", [&](const YAML::Node& k) { internal.segments = read_path(k, item, piece, PathEnds::any).segments; }}},
+               {{"kind",
+                 [&](const YAML::Node& k) {
+                   internal.kind = static_cast<pattern::LineKind>(choice(k, item, line_kinds).value_or(5));
+                 }},
+                {"path",
+                 [&](const YAML::Node& k) { internal.segments = read_path(k, item, piece, PathEnds::any).segments; }}},
                {"path"});
         piece.lines.push_back(internal);
       }
@@ -223,59 +247,68 @@ class Reader {
         remember(item, value);
         pattern::Mark mark{.name = mark_name};
         fields(value, item, "{kind: ..., at: [x, y]}",
-               {{"kind", [&](const YAML::Node& k) { mark.kind = static_cast<pattern::MarkKind>(choice(k, item, mark_kinds).value_or(0)); }},
+               {{"kind",
+                 [&](const YAML::Node& k) {
+                   mark.kind = static_cast<pattern::MarkKind>(choice(k, item, mark_kinds).value_or(0));
+                 }},
                 {"at", [&](const YAML::Node& k) { mark.at = position(k, item, piece).value_or(Point2::Zero()); }}},
                {"at"});
         piece.marks.push_back(mark);
       }
     };
-    fields(node, name, "a mapping that describes the piece",
-           {{"material", [&](const YAML::Node& n) { piece.material = text(n, part("material"), "a name").value_or(""); }},
-            {"cut",
-             [&](const YAML::Node& n) {
-               const auto value = n.IsScalar() ? parse_integer(n.Scalar()) : std::nullopt;
-               if (!value || *value < 1 || *value > 1000) return wrong_type(n, part("cut"), "a whole number from 1 to 1000");
-               piece.copies = static_cast<int>(*value);
-             }},
-            {"identical", [&](const YAML::Node& n) { piece.identical = flag(n, part("identical")).value_or(false); }},
-            {"allowance", [&](const YAML::Node& n) { piece.allowance = length(n, part("allowance")); }},
-            {"points",
-             [&](const YAML::Node& n) {
-               for (const auto& [point, value] : entries(n, part("points"), "a mapping of positions by name")) {
-                 remember(part(point), value);
-                 const auto p = coordinates(value, part(point));
-                 if (p) piece.points[point] = *p;
-                 else unreadable_points_.insert(name + "." + point);
-               }
-             }},
-            {"fold",
-             [&](const YAML::Node& n) {
-               remember(part("fold"), n);
-               piece.fold = text(n, part("fold"), "the name of an edge");
-             }},
-            {"grain",
-             [&](const YAML::Node& n) {
-               remember(part("grain"), n);
-               read_grain(n, part("grain"), piece);
-             }},
-            {"outline", [&](const YAML::Node& n) { piece.outline = read_edges(n, part("outline"), piece); }},
-            {"holes",
-             [&](const YAML::Node& n) {
-               for (const auto& [hole, value] : entries(n, part("holes"), "a mapping of lists of edges by name")) {
-                 remember(part(hole), value);
-                 piece.holes.push_back({hole, read_edges(value, part(hole), piece)});
-               }
-             }},
-            {"lines", read_lines},
-            {"notches", read_notches},
-            {"marks", read_marks}},
-           {"outline"});
+    fields(
+        node, name, "a mapping that describes the piece",
+        {{"material", [&](const YAML::Node& n) { piece.material = text(n, part("material"), "a name").value_or(""); }},
+         {"cut",
+          [&](const YAML::Node& n) {
+            const auto value = n.IsScalar() ? parse_integer(n.Scalar()) : std::nullopt;
+            if (!value || *value < 1 || *value > 1000)
+              return wrong_type(n, part("cut"), "a whole number from 1 to 1000");
+            piece.copies = static_cast<int>(*value);
+          }},
+         {"identical", [&](const YAML::Node& n) { piece.identical = flag(n, part("identical")).value_or(false); }},
+         {"allowance", [&](const YAML::Node& n) { piece.allowance = length(n, part("allowance")); }},
+         {"points",
+          [&](const YAML::Node& n) {
+            for (const auto& [point, value] : entries(n, part("points"), "a mapping of positions by name")) {
+              remember(part(point), value);
+              const auto p = coordinates(value, part(point));
+              if (p)
+                piece.points[point] = *p;
+              else
+                unreadable_points_.insert(name + "." + point);
+            }
+          }},
+         {"fold",
+          [&](const YAML::Node& n) {
+            remember(part("fold"), n);
+            piece.fold = text(n, part("fold"), "the name of an edge");
+          }},
+         {"grain",
+          [&](const YAML::Node& n) {
+            remember(part("grain"), n);
+            read_grain(n, part("grain"), piece);
+          }},
+         {"outline", [&](const YAML::Node& n) { piece.outline = read_edges(n, part("outline"), piece); }},
+         {"holes",
+          [&](const YAML::Node& n) {
+            for (const auto& [hole, value] : entries(n, part("holes"), "a mapping of lists of edges by name")) {
+              remember(part(hole), value);
+              piece.holes.push_back({hole, read_edges(value, part(hole), piece)});
+            }
+          }},
+         {"lines", read_lines},
+         {"notches", read_notches},
+         {"marks", read_marks}},
+        {"outline"});
     result_.pattern.pieces.push_back(std::move(piece));
   }
 
   void read_grain(const YAML::Node& node, const std::string& item, pattern::Piece& piece) {
     if (node.IsScalar() && node.Scalar() == "fold") {
-      if (!piece.fold) report("missing_key", node, item, "the grain follows the fold, but the piece has no fold", "name the edge on the fold, or give two points");
+      if (!piece.fold)
+        report("missing_key", node, item, "the grain follows the fold, but the piece has no fold",
+               "name the edge on the fold, or give two points");
       return;
     }
     if (!node.IsSequence() || node.size() != 2) return wrong_type(node, item, "two positions [from, to], or fold");
@@ -332,7 +365,9 @@ class Reader {
     for (const YAML::Node& step : node) {
       if (step.IsMap()) {
         if (!known_start) report("bad_path", step, item, "the path begins with a curve", "begin it with a point");
-        if (between) report("bad_path", step, item, "two curves follow each other without a point between", "put the point where they meet between them");
+        if (between)
+          report("bad_path", step, item, "two curves follow each other without a point between",
+                 "put the point where they meet between them");
         between.emplace(step);
         continue;
       }
@@ -356,18 +391,20 @@ class Reader {
     return path;
   }
 
-  std::optional<pattern::Segment> read_segment(const std::optional<YAML::Node>& node, const Point2& from, const Point2& to, const std::string& item,
-                                               const pattern::Piece& piece) {
+  std::optional<pattern::Segment> read_segment(const std::optional<YAML::Node>& node, const Point2& from,
+                                               const Point2& to, const std::string& item, const pattern::Piece& piece) {
     if (!node) return pattern::line_segment(from, to);
     std::optional<pattern::Segment> segment;
     fields(*node, item, "{curve: [...]} or {arc: {...}}",
            {{"curve",
              [&](const YAML::Node& n) {
-               if (!n.IsSequence() || n.size() < 1 || n.size() > 2) return wrong_type(n, item, "one or two control points [[x, y], [x, y]]");
+               if (!n.IsSequence() || n.size() < 1 || n.size() > 2)
+                 return wrong_type(n, item, "one or two control points [[x, y], [x, y]]");
                const auto a = position(n[0], item, piece);
                const auto b = n.size() == 2 ? position(n[1], item, piece) : a;
                if (!a || !b) return;
-               segment = n.size() == 2 ? pattern::cubic_segment(from, *a, *b, to) : pattern::quadratic_segment(from, *a, to);
+               segment =
+                   n.size() == 2 ? pattern::cubic_segment(from, *a, *b, to) : pattern::quadratic_segment(from, *a, to);
              }},
             {"arc", [&](const YAML::Node& n) { segment = read_arc(n, from, to, item, piece); }}},
            {});
@@ -375,7 +412,8 @@ class Reader {
     return segment;
   }
 
-  std::optional<pattern::Segment> read_arc(const YAML::Node& node, const Point2& from, const Point2& to, const std::string& item, const pattern::Piece& piece) {
+  std::optional<pattern::Segment> read_arc(const YAML::Node& node, const Point2& from, const Point2& to,
+                                           const std::string& item, const pattern::Piece& piece) {
     std::optional<Point2> through;
     std::optional<double> bulge, radius;
     bool left = true, large = false;
@@ -383,13 +421,18 @@ class Reader {
     fields(node, item, "{through: [x, y]}, {radius: r, turn: left} or {bulge: b}",
            {{"through", [&](const YAML::Node& n) { through = position(n, item, piece); }},
             {"radius", [&](const YAML::Node& n) { radius = length(n, item); }},
-            {"turn", [&](const YAML::Node& n) { left = choice(n, item, std::array{"left", "right"}).value_or(0) == 0; }},
+            {"turn",
+             [&](const YAML::Node& n) {
+               left = choice(n, item, std::array{"left", "right"}).value_or(0) == 0;
+             }},
             {"large", [&](const YAML::Node& n) { large = flag(n, item).value_or(false); }},
             {"bulge", [&](const YAML::Node& n) { bulge = number(n, item); }}},
            {});
     if (issues_.size() != before) return std::nullopt;
-    if (through.has_value() + bulge.has_value() + radius.has_value() != 1 || radius.has_value() != node["turn"].IsDefined() || (node["large"].IsDefined() && !radius)) {
-      report("bad_arc", node, item, "an arc is given by one of through, radius (with turn, perhaps large) and bulge", "keep one of them");
+    if (through.has_value() + bulge.has_value() + radius.has_value() != 1 ||
+        radius.has_value() != node["turn"].IsDefined() || (node["large"].IsDefined() && !radius)) {
+      report("bad_arc", node, item, "an arc is given by one of through, radius (with turn, perhaps large) and bulge",
+             "keep one of them");
       return std::nullopt;
     }
     if (bulge) return pattern::arc_segment(from, to, *bulge);
@@ -403,7 +446,8 @@ class Reader {
     }
     const double half = (to - from).norm() / 2;
     if (!(*radius >= half) || !(half > 0)) {
-      report("bad_arc", node, item, fmt::format("no circle of radius {} passes through both ends, which are {} apart", *radius, 2 * half),
+      report("bad_arc", node, item,
+             fmt::format("no circle of radius {} passes through both ends, which are {} apart", *radius, 2 * half),
              fmt::format("give a radius of {} or more", half));
       return std::nullopt;
     }
@@ -424,24 +468,33 @@ class Reader {
 /// A text as a YAML scalar: plain where that is safe, else in double quotes.
 std::string scalar(const std::string& text) {
   static const std::string marks = "_-./ ()@";
-  const auto plain_char = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || marks.find(c) != std::string::npos; };
-  const bool plain = !text.empty() && std::isalpha(static_cast<unsigned char>(text.front())) && text.back() != ' ' && std::all_of(text.begin(), text.end(), plain_char);
+  const auto plain_char = [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) || marks.find(c) != std::string::npos;
+  };
+  const bool plain = !text.empty() && std::isalpha(static_cast<unsigned char>(text.front())) && text.back() != ' ' &&
+                     std::all_of(text.begin(), text.end(), plain_char);
   static const std::set<std::string> reserved{"true", "false", "yes", "no", "on", "off", "null", "y", "n"};
   std::string lower = text;
-  std::transform(lower.begin(), lower.end(), lower.begin(), [](char c) { return static_cast<char>(std::tolower(static_cast<unsigned char>(c))); });
+  std::transform(lower.begin(), lower.end(), lower.begin(),
+                 [](char c) { return static_cast<char>(std::tolower(static_cast<unsigned char>(c))); });
   if (plain && !reserved.count(lower)) return text;
   std::string quoted = "\"";
   for (const char c : text) {
     const auto code = static_cast<unsigned char>(c);
     if (c == '"' || c == '\\') quoted += '\\';
-    if (c == '\n') quoted += "\\n";
-    else if (code < 0x20 || code == 0x7f) quoted += fmt::format("\\x{:02x}", code);
-    else quoted += c;
+    if (c == '\n')
+      quoted += "\\n";
+    else if (code < 0x20 || code == 0x7f)
+      quoted += fmt::format("\\x{:02x}", code);
+    else
+      quoted += c;
   }
   return quoted + "\"";
 }
 
-std::string xy(const Point2& p) { return fmt::format("[{}, {}]", format_number(p.x()), format_number(p.y())); }
+std::string xy(const Point2& p) {
+  return fmt::format("[{}, {}]", format_number(p.x()), format_number(p.y()));
+}
 
 /// True also for the sign of zero, which a comparison would not see.
 bool same(const Point2& a, const Point2& b) {
@@ -461,7 +514,9 @@ class Writer {
   }
 
  private:
-  void line(int depth, const std::string& text) { text_ += std::string(static_cast<std::size_t>(2 * depth), ' ') + text + "\n"; }
+  void line(int depth, const std::string& text) {
+    text_ += std::string(static_cast<std::size_t>(2 * depth), ' ') + text + "\n";
+  }
 
   void write_piece(const pattern::Piece& piece) {
     line(1, scalar(piece.name) + ":");
@@ -469,8 +524,10 @@ class Writer {
     line(2, fmt::format("cut: {}", piece.copies));
     if (piece.identical) line(2, "identical: true");
     if (piece.fold) line(2, "fold: " + scalar(*piece.fold));
-    if (piece.grain) line(2, fmt::format("grain: [{}, {}]", point(piece, piece.grain->from), point(piece, piece.grain->to)));
-    else if (piece.fold) line(2, "grain: fold");
+    if (piece.grain)
+      line(2, fmt::format("grain: [{}, {}]", point(piece, piece.grain->from), point(piece, piece.grain->to)));
+    else if (piece.fold)
+      line(2, "grain: fold");
     if (piece.allowance) line(2, "allowance: " + format_number(*piece.allowance));
     if (!piece.points.empty()) line(2, "points:");
     for (const auto& [name, p] : piece.points) line(3, scalar(name) + ": " + xy(p));
@@ -483,7 +540,8 @@ class Writer {
     }
     if (!piece.lines.empty()) line(2, "lines:");
     for (const pattern::InternalLine& internal : piece.lines) {
-      line(3, fmt::format("{}: {{kind: {}, path: {}}}", scalar(internal.name), line_kinds[static_cast<std::size_t>(internal.kind)],
+      line(3, fmt::format("{}: {{kind: {}, path: {}}}", scalar(internal.name),
+                          line_kinds[static_cast<std::size_t>(internal.kind)],
                           path_text(piece, internal.segments, "", "")));
     }
     if (!piece.notches.empty()) line(2, "notches:");
@@ -496,7 +554,8 @@ class Writer {
     }
     if (!piece.marks.empty()) line(2, "marks:");
     for (const pattern::Mark& mark : piece.marks) {
-      line(3, fmt::format("{}: {{kind: {}, at: {}}}", scalar(mark.name), mark_kinds[static_cast<std::size_t>(mark.kind)], xy(mark.at)));
+      line(3, fmt::format("{}: {{kind: {}, at: {}}}", scalar(mark.name),
+                          mark_kinds[static_cast<std::size_t>(mark.kind)], xy(mark.at)));
     }
   }
 
@@ -508,21 +567,30 @@ class Writer {
   }
 
   std::string edge_text(const pattern::Piece& piece, const pattern::Edge& edge) const {
-    std::string text = fmt::format("{{name: {}, path: {}", scalar(edge.name), path_text(piece, edge.segments, edge.from, edge.to));
+    std::string text =
+        fmt::format("{{name: {}, path: {}", scalar(edge.name), path_text(piece, edge.segments, edge.from, edge.to));
     if (edge.allowance) text += ", allowance: " + format_number(*edge.allowance);
     return text + "}";
   }
 
-  std::string path_text(const pattern::Piece& piece, const std::vector<pattern::Segment>& segments, const std::string& from, const std::string& to) const {
+  std::string path_text(const pattern::Piece& piece, const std::vector<pattern::Segment>& segments,
+                        const std::string& from, const std::string& to) const {
     if (segments.empty()) return "[]";
     std::string text = "[" + (from.empty() ? point(piece, segments.front().from) : scalar(from));
     for (std::size_t i = 0; i < segments.size(); ++i) {
       const pattern::Segment& s = segments[i];
       switch (s.kind) {
-        case pattern::Segment::Kind::line: break;
-        case pattern::Segment::Kind::quadratic: text += fmt::format(", {{curve: [{}]}}", xy(s.control_1)); break;
-        case pattern::Segment::Kind::cubic: text += fmt::format(", {{curve: [{}, {}]}}", xy(s.control_1), xy(s.control_2)); break;
-        case pattern::Segment::Kind::arc: text += fmt::format(", {{arc: {{bulge: {}}}}}", format_number(s.bulge)); break;
+        case pattern::Segment::Kind::line:
+          break;
+        case pattern::Segment::Kind::quadratic:
+          text += fmt::format(", {{curve: [{}]}}", xy(s.control_1));
+          break;
+        case pattern::Segment::Kind::cubic:
+          text += fmt::format(", {{curve: [{}, {}]}}", xy(s.control_1), xy(s.control_2));
+          break;
+        case pattern::Segment::Kind::arc:
+          text += fmt::format(", {{arc: {{bulge: {}}}}}", format_number(s.bulge));
+          break;
       }
       text += ", " + (i + 1 == segments.size() && !to.empty() ? scalar(to) : point(piece, s.to));
     }
@@ -534,7 +602,9 @@ class Writer {
 
 }  // namespace
 
-Result<PatternFile> parse_pattern_file(std::string_view yaml, const std::string& file) { return Reader(file).read(yaml); }
+Result<PatternFile> parse_pattern_file(std::string_view yaml, const std::string& file) {
+  return Reader(file).read(yaml);
+}
 
 Issues check(const PatternFile& file) {
   Issues issues = pattern::check(file.pattern);
@@ -562,6 +632,8 @@ Result<pattern::Pattern> read_pattern(const std::string& path) {
   return parse_pattern(bytes, path);
 }
 
-std::string format_pattern(const pattern::Pattern& pattern) { return Writer().write(pattern); }
+std::string format_pattern(const pattern::Pattern& pattern) {
+  return Writer().write(pattern);
+}
 
 }  // namespace toile::io

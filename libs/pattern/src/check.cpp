@@ -1,10 +1,10 @@
-#include "geometry.h"
-#include "toile/base/text.h"
-
 #include <algorithm>
 #include <cmath>
 #include <set>
 #include <tuple>
+
+#include "geometry.h"
+#include "toile/base/text.h"
 
 namespace toile::pattern {
 namespace {
@@ -13,17 +13,24 @@ constexpr double flat_tolerance = 1e-6;      // of polylines that stand for curv
 constexpr double straight_tolerance = 1e-5;  // of a fold [m]
 constexpr double touch_tolerance = 1e-8;     // closer than this, two parts of a border touch [m]
 
-double cross(const Point2& a, const Point2& b) { return a.x() * b.y() - a.y() * b.x(); }
+double cross(const Point2& a, const Point2& b) {
+  return a.x() * b.y() - a.y() * b.x();
+}
 
 bool good_name(std::string_view name) {
   if (name.empty() || !(std::isalpha(static_cast<unsigned char>(name.front())) || name.front() == '_')) return false;
-  return std::all_of(name.begin(), name.end(), [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-'; });
+  return std::all_of(name.begin(), name.end(),
+                     [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-'; });
 }
 
 class PieceCheck {
  public:
   PieceCheck(const Pattern& pattern, const Piece& piece, Issues& issues)
-      : pattern_(pattern), piece_(piece), issues_(issues), map_(metres_from_pattern(pattern)), scale_(in_metres(pattern.units)) {}
+      : pattern_(pattern),
+        piece_(piece),
+        issues_(issues),
+        map_(metres_from_pattern(pattern)),
+        scale_(in_metres(pattern.units)) {}
 
   void run() {
     check_names();
@@ -59,17 +66,23 @@ class PieceCheck {
 
   void check_names() {
     if (!good_name(piece_.name)) {
-      report("bad_name", "", fmt::format("'{}' is no name for a piece", piece_.name), "use letters, digits, _ and -, starting with a letter");
+      report("bad_name", "", fmt::format("'{}' is no name for a piece", piece_.name),
+             "use letters, digits, _ and -, starting with a letter");
     }
     std::set<std::string> lines, holes, notches, marks;
     const auto unique = [&](std::set<std::string>& names, const std::string& name, const char* what) {
       if (!good_name(name)) {
-        report("bad_name", name, fmt::format("'{}' is no name for {}", name, what), "use letters, digits, _ and -, starting with a letter");
+        report("bad_name", name, fmt::format("'{}' is no name for {}", name, what),
+               "use letters, digits, _ and -, starting with a letter");
       }
-      if (!names.insert(name).second) report("duplicate_name", name, fmt::format("the name '{}' is used twice", name), "give every edge and line a name of its own");
+      if (!names.insert(name).second)
+        report("duplicate_name", name, fmt::format("the name '{}' is used twice", name),
+               "give every edge and line a name of its own");
     };
     for (const auto& [name, p] : piece_.points) {
-      if (!good_name(name)) report("bad_name", name, fmt::format("'{}' is no name for a point", name), "use letters, digits, _ and -, starting with a letter");
+      if (!good_name(name))
+        report("bad_name", name, fmt::format("'{}' is no name for a point", name),
+               "use letters, digits, _ and -, starting with a letter");
       if (!p.allFinite()) report("broken_point", name, "its coordinates are not finite", "give two numbers");
     }
     for (const Edge& edge : piece_.outline) unique(lines, edge.name, "an edge");
@@ -84,7 +97,8 @@ class PieceCheck {
     const auto clash = [&](const std::set<std::string>& names) {
       for (const std::string& name : names) {
         if (names.count(name + "_m")) {
-          report("duplicate_name", name + "_m", fmt::format("unfolding the piece gives '{}' this name too", name), "names ending in _m belong to the mirrored half: choose another");
+          report("duplicate_name", name + "_m", fmt::format("unfolding the piece gives '{}' this name too", name),
+                 "names ending in _m belong to the mirrored half: choose another");
         }
       }
     };
@@ -102,8 +116,10 @@ class PieceCheck {
     }
     for (std::size_t i = 0; i < segments.size(); ++i) {
       const Segment& s = segments[i];
-      if (!(s.from.allFinite() && s.to.allFinite() && s.control_1.allFinite() && s.control_2.allFinite() && std::isfinite(s.bulge))) {
-        report("broken_edge", name, fmt::format("segment {} has a number that is not finite", i + 1), "give finite coordinates");
+      if (!(s.from.allFinite() && s.to.allFinite() && s.control_1.allFinite() && s.control_2.allFinite() &&
+            std::isfinite(s.bulge))) {
+        report("broken_edge", name, fmt::format("segment {} has a number that is not finite", i + 1),
+               "give finite coordinates");
         return false;
       }
     }
@@ -111,13 +127,15 @@ class PieceCheck {
     for (std::size_t i = 0; i < segments.size(); ++i) {
       const Segment s = map_(segments[i]);
       if (Curve({s}).length() <= weld_tolerance) {
-        report(zero_code, name, fmt::format("segment {} at {} has no length", i + 1, at(s.from)), "remove it, or move one of its ends");
+        report(zero_code, name, fmt::format("segment {} at {} has no length", i + 1, at(s.from)),
+               "remove it, or move one of its ends");
         good = false;
       }
       if (i == 0) continue;
       const Point2 before = map_(segments[i - 1].to);
       if ((s.from - before).norm() > weld_tolerance) {
-        report("broken_edge", name, fmt::format("it jumps from {} to {}", at(before), at(s.from)), "start each segment where the one before ends");
+        report("broken_edge", name, fmt::format("it jumps from {} to {}", at(before), at(s.from)),
+               "start each segment where the one before ends");
         good = false;
       }
     }
@@ -128,7 +146,8 @@ class PieceCheck {
   bool check_loop(const std::vector<Edge>& edges, const std::string& loop, std::vector<Curve>& curves) {
     bool good = true;
     for (const Edge& edge : edges) {
-      if (edge.allowance && !(*edge.allowance >= 0)) report("bad_allowance", edge.name, "its seam allowance is negative", "give a length of 0 or more");
+      if (edge.allowance && !(*edge.allowance >= 0))
+        report("bad_allowance", edge.name, "its seam allowance is negative", "give a length of 0 or more");
       if (!check_segments(edge.segments, edge.name, "zero_length_edge")) {
         good = false;
         continue;
@@ -136,10 +155,13 @@ class PieceCheck {
       const auto end = [&](const std::string& name, const Point2& p, const char* which) {
         const auto it = piece_.points.find(name);
         if (it == piece_.points.end()) {
-          report("unknown_point", edge.name, fmt::format("its {} point '{}' does not exist", which, name), suggestion(name, point_names()));
+          report("unknown_point", edge.name, fmt::format("its {} point '{}' does not exist", which, name),
+                 suggestion(name, point_names()));
           good = false;
         } else if (const double gap = (map_(it->second) - map_(p)).norm(); !(gap <= weld_tolerance)) {
-          report("edge_off_point", edge.name, fmt::format("it {}s at {}, {} away from point '{}'", which, at(map_(p)), length(gap), name), "let the edge meet its point");
+          report("edge_off_point", edge.name,
+                 fmt::format("it {}s at {}, {} away from point '{}'", which, at(map_(p)), length(gap), name),
+                 "let the edge meet its point");
           good = false;
         }
       };
@@ -151,7 +173,9 @@ class PieceCheck {
       const Edge& next = edges[(i + 1) % edges.size()];
       const Point2 a = map_(edges[i].segments.back().to), b = map_(next.segments.front().from);
       if ((a - b).norm() > weld_tolerance) {
-        report("open_outline", edges[i].name, fmt::format("the {} is open: it ends at {}, the next edge '{}' starts at {}, {} away", loop, at(a), next.name, at(b), length((a - b).norm())),
+        report("open_outline", edges[i].name,
+               fmt::format("the {} is open: it ends at {}, the next edge '{}' starts at {}, {} away", loop, at(a),
+                           next.name, at(b), length((a - b).norm())),
                "list the edges in order, each starting at the point where the one before ends");
         good = false;
       }
@@ -182,10 +206,13 @@ class PieceCheck {
       const Polyline& line = loops[l].second;
       for (std::size_t i = 0; i + 1 < line.points.size(); ++i) {
         const double x0 = line.points[i].x(), x1 = line.points[i + 1].x();
-        sides.push_back({std::min(x0, x1) - touch_tolerance, std::max(x0, x1) + touch_tolerance, static_cast<int>(l), static_cast<int>(i)});
+        sides.push_back({std::min(x0, x1) - touch_tolerance, std::max(x0, x1) + touch_tolerance, static_cast<int>(l),
+                         static_cast<int>(i)});
       }
     }
-    std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) { return std::tie(a.low, a.loop, a.index) < std::tie(b.low, b.loop, b.index); });
+    std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
+      return std::tie(a.low, a.loop, a.index) < std::tie(b.low, b.loop, b.index);
+    });
     std::set<std::pair<std::string, std::string>> told;
     const auto tell = [&](const Side& a, const Side& b, const Point2& where, const char* how) {
       const auto name = [&](const Side& s) {
@@ -195,7 +222,9 @@ class PieceCheck {
       std::string first = name(a), second = name(b);
       if (second < first) std::swap(first, second);
       if (!told.insert({first, second}).second) return;
-      report("self_crossing", first, first == second ? fmt::format("it {} itself at {}", how, at(where)) : fmt::format("it {} edge '{}' at {}", how, second, at(where)),
+      report("self_crossing", first,
+             first == second ? fmt::format("it {} itself at {}", how, at(where))
+                             : fmt::format("it {} edge '{}' at {}", how, second, at(where)),
              "redraw the edges so that they meet at their ends only");
     };
     for (std::size_t i = 0; i < sides.size(); ++i) {
@@ -205,17 +234,22 @@ class PieceCheck {
         const auto& pb = loops[static_cast<std::size_t>(b.loop)].second.points;
         const Point2 a0 = pa[static_cast<std::size_t>(a.index)], a1 = pa[static_cast<std::size_t>(a.index) + 1];
         const Point2 b0 = pb[static_cast<std::size_t>(b.index)], b1 = pb[static_cast<std::size_t>(b.index) + 1];
-        if (std::max(a0.y(), a1.y()) + touch_tolerance < std::min(b0.y(), b1.y()) || std::max(b0.y(), b1.y()) + touch_tolerance < std::min(a0.y(), a1.y())) continue;
+        if (std::max(a0.y(), a1.y()) + touch_tolerance < std::min(b0.y(), b1.y()) ||
+            std::max(b0.y(), b1.y()) + touch_tolerance < std::min(a0.y(), a1.y()))
+          continue;
         const int last = static_cast<int>(pa.size()) - 2;
         if (a.loop == b.loop && (std::abs(a.index - b.index) == 1 || std::abs(a.index - b.index) == last)) {
           // Neighbours share a point; only turning straight back makes them overlap.
           const bool a_first = b.index == a.index + 1 || (a.index == last && b.index == 0 && last > 1);
-          const Point2 in = a_first ? Point2(a1 - a0) : Point2(b1 - b0), out = a_first ? Point2(b1 - b0) : Point2(a1 - a0);
+          const Point2 in = a_first ? Point2(a1 - a0) : Point2(b1 - b0),
+                       out = a_first ? Point2(b1 - b0) : Point2(a1 - a0);
           const Point2 corner = a_first ? a1 : b1;
-          if (in.dot(out) < 0 && std::abs(cross(in, out)) <= 1e-9 * in.norm() * out.norm()) tell(a, b, corner, "turns back onto");
+          if (in.dot(out) < 0 && std::abs(cross(in, out)) <= 1e-9 * in.norm() * out.norm())
+            tell(a, b, corner, "turns back onto");
           continue;
         }
-        const double d0 = cross(a1 - a0, b0 - a0), d1 = cross(a1 - a0, b1 - a0), d2 = cross(b1 - b0, a0 - b0), d3 = cross(b1 - b0, a1 - b0);
+        const double d0 = cross(a1 - a0, b0 - a0), d1 = cross(a1 - a0, b1 - a0), d2 = cross(b1 - b0, a0 - b0),
+                     d3 = cross(b1 - b0, a1 - b0);
         if (((d0 > 0) != (d1 > 0)) && ((d2 > 0) != (d3 > 0)) && d0 != d1) {
           tell(a, b, a0 + (a1 - a0) * (d2 / (d2 - d3)), "crosses");
         } else {
@@ -257,7 +291,8 @@ class PieceCheck {
       if (border_ && crossing_free_) {
         for (const Point2& p : loop.points) {
           if (!winds_around(*border_, p)) {
-            report("hole_outside", hole.name, fmt::format("the hole reaches outside the piece at {}", at(p)), "keep it inside the outline");
+            report("hole_outside", hole.name, fmt::format("the hole reaches outside the piece at {}", at(p)),
+                   "keep it inside the outline");
             break;
           }
         }
@@ -272,7 +307,9 @@ class PieceCheck {
     for (std::size_t i = 0; i < hole_loops_.size(); ++i) {
       for (std::size_t j = 0; j < hole_loops_.size(); ++j) {
         if (i != j && winds_around(hole_loops_[j], hole_loops_[i].points.front())) {
-          report("hole_outside", "", fmt::format("a hole at {} lies inside another hole", at(hole_loops_[i].points.front())), "remove one of them");
+          report("hole_outside", "",
+                 fmt::format("a hole at {} lies inside another hole", at(hole_loops_[i].points.front())),
+                 "remove one of them");
         }
       }
     }
@@ -281,7 +318,9 @@ class PieceCheck {
   /// On the cloth, its border included.
   bool on_cloth(const Point2& p) const {
     if (!winds_around(*border_, p) && distance_to(*border_, p) > on_edge_tolerance) return false;
-    return std::none_of(hole_loops_.begin(), hole_loops_.end(), [&](const Polyline& hole) { return winds_around(hole, p) && distance_to(hole, p) > on_edge_tolerance; });
+    return std::none_of(hole_loops_.begin(), hole_loops_.end(), [&](const Polyline& hole) {
+      return winds_around(hole, p) && distance_to(hole, p) > on_edge_tolerance;
+    });
   }
 
   void check_lines_and_marks() {
@@ -291,7 +330,8 @@ class PieceCheck {
       for (const Segment& segment : line.segments) segments.push_back(map_(segment));
       for (const Point2& p : flatten({Curve(std::move(segments))}, 1e-5).points) {
         if (!on_cloth(p)) {
-          report("line_outside", line.name, fmt::format("the line leaves the cloth at {}", at(p)), "end it at the border");
+          report("line_outside", line.name, fmt::format("the line leaves the cloth at {}", at(p)),
+                 "end it at the border");
           break;
         }
       }
@@ -299,7 +339,8 @@ class PieceCheck {
     if (!border_) return;
     for (const Mark& mark : piece_.marks) {
       if (!mark.at.allFinite() || !on_cloth(map_(mark.at))) {
-        report("mark_outside", mark.name, fmt::format("the mark at {} is not on the cloth", at(map_(mark.at))), "move it onto the piece");
+        report("mark_outside", mark.name, fmt::format("the mark at {} is not on the cloth", at(map_(mark.at))),
+               "move it onto the piece");
       }
     }
   }
@@ -313,7 +354,8 @@ class PieceCheck {
     for (const Notch& notch : piece_.notches) {
       const int given = notch.point.has_value() + notch.distance.has_value() + notch.fraction.has_value();
       if (given != 1) {
-        report("bad_notch", notch.name, fmt::format("the notch is placed in {} ways", given), "give one of point, distance and fraction");
+        report("bad_notch", notch.name, fmt::format("the notch is placed in {} ways", given),
+               "give one of point, distance and fraction");
         continue;
       }
       const Edge* edge = nullptr;
@@ -322,40 +364,51 @@ class PieceCheck {
         for (const Edge& e : hole.edges) edge = e.name == notch.edge ? &e : edge;
       }
       if (!edge) {
-        report("unknown_edge", notch.name, fmt::format("the notch's edge '{}' does not exist", notch.edge), suggestion(notch.edge, names));
+        report("unknown_edge", notch.name, fmt::format("the notch's edge '{}' does not exist", notch.edge),
+               suggestion(notch.edge, names));
         continue;
       }
       if (edge->segments.empty()) continue;
       std::vector<Segment> segments;
       for (const Segment& segment : edge->segments) {
-        if (!segment.from.allFinite() || !segment.to.allFinite() || !segment.control_1.allFinite() || !segment.control_2.allFinite()) return;
+        if (!segment.from.allFinite() || !segment.to.allFinite() || !segment.control_1.allFinite() ||
+            !segment.control_2.allFinite())
+          return;
         segments.push_back(map_(segment));
       }
       const Curve curve(std::move(segments));
       if (notch.point) {
         const auto it = piece_.points.find(*notch.point);
         if (it == piece_.points.end()) {
-          report("unknown_point", notch.name, fmt::format("the notch's point '{}' does not exist", *notch.point), suggestion(*notch.point, point_names()));
+          report("unknown_point", notch.name, fmt::format("the notch's point '{}' does not exist", *notch.point),
+                 suggestion(*notch.point, point_names()));
         } else if (const auto nearest = curve.nearest(map_(it->second)); !(nearest.distance <= on_edge_tolerance)) {
-          report("notch_off_border", notch.name, fmt::format("its point '{}' at {} is {} away from edge '{}'", *notch.point, at(map_(it->second)), length(nearest.distance), notch.edge),
+          report("notch_off_border", notch.name,
+                 fmt::format("its point '{}' at {} is {} away from edge '{}'", *notch.point, at(map_(it->second)),
+                             length(nearest.distance), notch.edge),
                  fmt::format("move it onto the edge (nearest: {})", at(nearest.point)));
         }
       } else if (notch.distance && !(std::abs(*notch.distance) * scale_ <= curve.length() * (1 + 1e-12))) {
-        report("notch_off_border", notch.name, fmt::format("its distance {} is beyond the length {} of edge '{}'", length(*notch.distance * scale_), length(curve.length()), notch.edge),
+        report("notch_off_border", notch.name,
+               fmt::format("its distance {} is beyond the length {} of edge '{}'", length(*notch.distance * scale_),
+                           length(curve.length()), notch.edge),
                "give a smaller distance");
       } else if (notch.fraction && !(*notch.fraction >= 0 && *notch.fraction <= 1)) {
-        report("notch_off_border", notch.name, fmt::format("its fraction {} is not between 0 and 1", *notch.fraction), "give a fraction of the edge's length");
+        report("notch_off_border", notch.name, fmt::format("its fraction {} is not between 0 and 1", *notch.fraction),
+               "give a fraction of the edge's length");
       }
     }
   }
 
   void check_grain() {
     if (!piece_.grain) {
-      if (!piece_.fold) report("grain_missing", "", "it has no grain line", "draw one along the warp (or name the fold edge)");
+      if (!piece_.fold)
+        report("grain_missing", "", "it has no grain line", "draw one along the warp (or name the fold edge)");
       return;
     }
     const double size = (map_(piece_.grain->to) - map_(piece_.grain->from)).norm();
-    if (!(size > weld_tolerance)) report("grain_zero", "grain", "the grain line has no length", "give two different points");
+    if (!(size > weld_tolerance))
+      report("grain_zero", "grain", "the grain line has no length", "give two different points");
   }
 
   void check_fold() {
@@ -368,7 +421,8 @@ class PieceCheck {
       if (outline_.empty()) return;  // already told what is wrong with the outline
       const Point2 a = outline_[i].from(), d = outline_[i].to() - a;
       if (piece_.outline.size() < 2 || !(d.norm() > weld_tolerance)) {
-        report("fold_not_straight", edge.name, "the fold starts and ends at the same point", "the fold is one straight edge of several");
+        report("fold_not_straight", edge.name, "the fold starts and ends at the same point",
+               "the fold is one straight edge of several");
         return;
       }
       const Polyline fold = flatten({outline_[i]}, flat_tolerance);
@@ -376,7 +430,9 @@ class PieceCheck {
       for (const Point2& p : fold.points) {
         const double off = std::abs(cross(d.normalized(), p - a)), here = (p - a).dot(d.normalized());
         if (off > straight_tolerance || here < along - straight_tolerance) {
-          report("fold_not_straight", edge.name, fmt::format("the fold is not straight: {} off its chord at {}", length(off), at(p)), "only a straight edge can lie on the fold");
+          report("fold_not_straight", edge.name,
+                 fmt::format("the fold is not straight: {} off its chord at {}", length(off), at(p)),
+                 "only a straight edge can lie on the fold");
           return;
         }
         along = here;
@@ -390,11 +446,14 @@ class PieceCheck {
         if (side > high) high = side, high_at = p;
       }
       if (std::min(-low, high) > straight_tolerance) {
-        report("piece_across_fold", edge.name, fmt::format("the piece lies on both sides of the fold (to {} and {})", at(low_at), at(high_at)), "draw the half on one side only");
+        report("piece_across_fold", edge.name,
+               fmt::format("the piece lies on both sides of the fold (to {} and {})", at(low_at), at(high_at)),
+               "draw the half on one side only");
       }
       return;
     }
-    report("unknown_edge", "fold", fmt::format("the fold edge '{}' is not in the outline", *piece_.fold), suggestion(*piece_.fold, names));
+    report("unknown_edge", "fold", fmt::format("the fold edge '{}' is not in the outline", *piece_.fold),
+           suggestion(*piece_.fold, names));
   }
 
   const Pattern& pattern_;
@@ -412,14 +471,19 @@ class PieceCheck {
 
 Issues check(const Pattern& pattern) {
   Issues issues;
-  if (pattern.pieces.empty()) issues.push_back(Issue{"no_pieces", {}, "the pattern has no pieces", "draw at least one", Category::check});
+  if (pattern.pieces.empty())
+    issues.push_back(Issue{"no_pieces", {}, "the pattern has no pieces", "draw at least one", Category::check});
   std::set<std::string> names;
   for (const Piece& piece : pattern.pieces) {
     const int copies = std::clamp(piece.copies, 1, 1000);
     for (int copy = 0; copy < copies; ++copy) {
       const std::string name = panel_name(piece, copy);
       if (names.insert(name).second) continue;
-      issues.push_back(Issue{"duplicate_name", {.item = piece.name}, fmt::format("two panels would be called '{}'", name), "give the pieces other names", Category::check});
+      issues.push_back(Issue{"duplicate_name",
+                             {.item = piece.name},
+                             fmt::format("two panels would be called '{}'", name),
+                             "give the pieces other names",
+                             Category::check});
       break;
     }
     PieceCheck(pattern, piece, issues).run();

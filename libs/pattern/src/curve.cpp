@@ -9,20 +9,28 @@
 namespace toile::pattern {
 namespace {
 
-double cross(const Point2& a, const Point2& b) { return a.x() * b.y() - a.y() * b.x(); }
-Point2 left_of(const Point2& d) { return {-d.y(), d.x()}; }
+double cross(const Point2& a, const Point2& b) {
+  return a.x() * b.y() - a.y() * b.x();
+}
+Point2 left_of(const Point2& d) {
+  return {-d.y(), d.x()};
+}
 Point2 rotated(const Point2& d, double angle) {
   const double c = std::cos(angle), s = std::sin(angle);
   return {c * d.x() - s * d.y(), s * d.x() + c * d.y()};
 }
 
-double turn(const Segment& arc) { return 4 * std::atan(arc.bulge); }
+double turn(const Segment& arc) {
+  return 4 * std::atan(arc.bulge);
+}
 /// sin(fraction * angle) / sin(angle), also where the angle vanishes.
 double sine_ratio(double fraction, double angle) {
   return std::abs(angle) < 1e-9 ? fraction : std::sin(fraction * angle) / std::sin(angle);
 }
 /// angle / sin(angle), also where the angle vanishes.
-double angle_over_sine(double angle) { return std::abs(angle) < 1e-9 ? 1 : angle / std::sin(angle); }
+double angle_over_sine(double angle) {
+  return std::abs(angle) < 1e-9 ? 1 : angle / std::sin(angle);
+}
 
 constexpr int gauss_points = 12;
 struct Gauss {
@@ -55,15 +63,19 @@ Gauss make_gauss() {
 double speed_integral(const Segment& segment, double t0, double t1) {
   static const Gauss gauss = make_gauss();
   double sum = 0;
-  for (std::size_t i = 0; i < gauss_points; ++i) sum += gauss.w[i] * derivative(segment, t0 + (t1 - t0) * gauss.x[i]).norm();
+  for (std::size_t i = 0; i < gauss_points; ++i)
+    sum += gauss.w[i] * derivative(segment, t0 + (t1 - t0) * gauss.x[i]).norm();
   return sum * (t1 - t0);
 }
 
 double segment_scale(const Segment& s) {
   switch (s.kind) {
-    case Segment::Kind::quadratic: return (s.control_1 - s.from).norm() + (s.to - s.control_1).norm();
-    case Segment::Kind::cubic: return (s.control_1 - s.from).norm() + (s.control_2 - s.control_1).norm() + (s.to - s.control_2).norm();
-    default: return (s.to - s.from).norm();
+    case Segment::Kind::quadratic:
+      return (s.control_1 - s.from).norm() + (s.to - s.control_1).norm();
+    case Segment::Kind::cubic:
+      return (s.control_1 - s.from).norm() + (s.control_2 - s.control_1).norm() + (s.to - s.control_2).norm();
+    default:
+      return (s.to - s.from).norm();
   }
 }
 
@@ -71,7 +83,9 @@ constexpr int deepest_interval = 40;
 
 }  // namespace
 
-Segment line_segment(const Point2& from, const Point2& to) { return {.kind = Segment::Kind::line, .from = from, .to = to}; }
+Segment line_segment(const Point2& from, const Point2& to) {
+  return {.kind = Segment::Kind::line, .from = from, .to = to};
+}
 Segment quadratic_segment(const Point2& from, const Point2& control, const Point2& to) {
   return {.kind = Segment::Kind::quadratic, .from = from, .to = to, .control_1 = control};
 }
@@ -88,7 +102,9 @@ Result<Segment> arc_through(const Point2& from, const Point2& through, const Poi
   // The angle at the point seen from both ends is half the turn of the other part of the circle.
   const double sine = cross(a, b), cosine = a.dot(b);
   if (!(scale > 0) || std::abs(sine) <= 1e-12 * scale || !((to - from).norm() > 0)) {
-    return Issue{"bad_arc", {}, fmt::format("the arc's ends and the point ({}, {}) on it lie on one line", through.x(), through.y()),
+    return Issue{"bad_arc",
+                 {},
+                 fmt::format("the arc's ends and the point ({}, {}) on it lie on one line", through.x(), through.y()),
                  "give a point off the chord, or draw a line"};
   }
   const double inscribed = std::atan2(std::abs(sine), cosine);  // in (0, pi); the turn is 2 pi - 2 inscribed
@@ -109,9 +125,12 @@ Point2 position(const Segment& s, double t) {
   if (t >= 1) return s.to;
   const double u = 1 - t;
   switch (s.kind) {
-    case Segment::Kind::line: return u * s.from + t * s.to;
-    case Segment::Kind::quadratic: return u * u * s.from + 2 * u * t * s.control_1 + t * t * s.to;
-    case Segment::Kind::cubic: return u * u * u * s.from + 3 * u * u * t * s.control_1 + 3 * u * t * t * s.control_2 + t * t * t * s.to;
+    case Segment::Kind::line:
+      return u * s.from + t * s.to;
+    case Segment::Kind::quadratic:
+      return u * u * s.from + 2 * u * t * s.control_1 + t * t * s.to;
+    case Segment::Kind::cubic:
+      return u * u * u * s.from + 3 * u * u * t * s.control_1 + 3 * u * t * t * s.control_2 + t * t * t * s.to;
     case Segment::Kind::arc: {
       const double half = turn(s) / 2;
       return s.from + sine_ratio(t, half) * rotated(s.to - s.from, (t - 1) * half);
@@ -123,10 +142,13 @@ Point2 position(const Segment& s, double t) {
 Point2 derivative(const Segment& s, double t) {
   const double u = 1 - t;
   switch (s.kind) {
-    case Segment::Kind::line: return s.to - s.from;
-    case Segment::Kind::quadratic: return 2 * u * (s.control_1 - s.from) + 2 * t * (s.to - s.control_1);
+    case Segment::Kind::line:
+      return s.to - s.from;
+    case Segment::Kind::quadratic:
+      return 2 * u * (s.control_1 - s.from) + 2 * t * (s.to - s.control_1);
     case Segment::Kind::cubic:
-      return 3 * u * u * (s.control_1 - s.from) + 6 * u * t * (s.control_2 - s.control_1) + 3 * t * t * (s.to - s.control_2);
+      return 3 * u * u * (s.control_1 - s.from) + 6 * u * t * (s.control_2 - s.control_1) +
+             3 * t * t * (s.to - s.control_2);
     case Segment::Kind::arc: {
       const double half = turn(s) / 2;
       return angle_over_sine(half) * rotated(s.to - s.from, (2 * t - 1) * half);
@@ -137,11 +159,14 @@ Point2 derivative(const Segment& s, double t) {
 
 Point2 second_derivative(const Segment& s, double t) {
   switch (s.kind) {
-    case Segment::Kind::line: return Point2::Zero();
-    case Segment::Kind::quadratic: return 2 * (s.to - 2 * s.control_1 + s.from);
+    case Segment::Kind::line:
+      return Point2::Zero();
+    case Segment::Kind::quadratic:
+      return 2 * (s.to - 2 * s.control_1 + s.from);
     case Segment::Kind::cubic:
       return 6 * (1 - t) * (s.control_2 - 2 * s.control_1 + s.from) + 6 * t * (s.to - 2 * s.control_2 + s.control_1);
-    case Segment::Kind::arc: return turn(s) * left_of(derivative(s, t));
+    case Segment::Kind::arc:
+      return turn(s) * left_of(derivative(s, t));
   }
   return Point2::Zero();
 }
@@ -152,13 +177,18 @@ Segment part(const Segment& s, double t0, double t1) {
   r.to = position(s, t1);
   const double dt = t1 - t0;
   switch (s.kind) {
-    case Segment::Kind::line: break;
-    case Segment::Kind::quadratic: r.control_1 = r.from + dt / 2 * derivative(s, t0); break;
+    case Segment::Kind::line:
+      break;
+    case Segment::Kind::quadratic:
+      r.control_1 = r.from + dt / 2 * derivative(s, t0);
+      break;
     case Segment::Kind::cubic:
       r.control_1 = t0 <= 0 && t1 >= 1 ? s.control_1 : Point2(r.from + dt / 3 * derivative(s, t0));
       r.control_2 = t0 <= 0 && t1 >= 1 ? s.control_2 : Point2(r.to - dt / 3 * derivative(s, t1));
       break;
-    case Segment::Kind::arc: r.bulge = std::tan(dt * turn(s) / 4); break;
+    case Segment::Kind::arc:
+      r.bulge = std::tan(dt * turn(s) / 4);
+      break;
   }
   return r;
 }
@@ -178,26 +208,30 @@ std::pair<Point2, Point2> bounds(const Segment& s) {
     const double heading = std::atan2(start.y(), start.x());
     const double quarter = std::numbers::pi / 2;
     const double first = std::min(heading, heading + whole), last = std::max(heading, heading + whole);
-    for (double k = std::ceil(first / quarter); k * quarter <= last; ++k) include(position(s, (k * quarter - heading) / whole));
+    for (double k = std::ceil(first / quarter); k * quarter <= last; ++k)
+      include(position(s, (k * quarter - heading) / whole));
   }
   return {low, high};
 }
 
 double sector_area(const Segment& s) {
   switch (s.kind) {
-    case Segment::Kind::line: return cross(s.from, s.to) / 2;
-    case Segment::Kind::quadratic: return (2 * cross(s.from, s.control_1) + cross(s.from, s.to) + 2 * cross(s.control_1, s.to)) / 6;
+    case Segment::Kind::line:
+      return cross(s.from, s.to) / 2;
+    case Segment::Kind::quadratic:
+      return (2 * cross(s.from, s.control_1) + cross(s.from, s.to) + 2 * cross(s.control_1, s.to)) / 6;
     case Segment::Kind::cubic:
-      return (6 * cross(s.from, s.control_1) + 3 * cross(s.from, s.control_2) + cross(s.from, s.to) + 3 * cross(s.control_1, s.control_2) +
-              3 * cross(s.control_1, s.to) + 6 * cross(s.control_2, s.to)) /
+      return (6 * cross(s.from, s.control_1) + 3 * cross(s.from, s.control_2) + cross(s.from, s.to) +
+              3 * cross(s.control_1, s.control_2) + 3 * cross(s.control_1, s.to) + 6 * cross(s.control_2, s.to)) /
              20;
     case Segment::Kind::arc: {
       const double angle = turn(s);
       if (angle == 0) return cross(s.from, s.to) / 2;
       const double radius = (s.to - s.from).norm() / (2 * std::sin(angle / 2));
       // angle - sin(angle) loses its digits where the angle is small.
-      const double excess =
-          std::abs(angle) < 0.05 ? angle * angle * angle / 6 * (1 - angle * angle / 20 * (1 - angle * angle / 42)) : angle - std::sin(angle);
+      const double excess = std::abs(angle) < 0.05
+                                ? angle * angle * angle / 6 * (1 - angle * angle / 20 * (1 - angle * angle / 42))
+                                : angle - std::sin(angle);
       return cross(s.from, s.to) / 2 + radius * radius * excess / 2;
     }
   }
@@ -258,7 +292,8 @@ double Curve::arc_length(std::size_t segment, double t) const {
   if (t >= 1) return whole;
   if (intervals_[segment].empty()) return t * whole;
   const auto& intervals = intervals_[segment];
-  const auto it = std::lower_bound(intervals.begin(), intervals.end(), t, [](const Interval& interval, double value) { return interval.t1 < value; });
+  const auto it = std::lower_bound(intervals.begin(), intervals.end(), t,
+                                   [](const Interval& interval, double value) { return interval.t1 < value; });
   return it->s0 + speed_integral(segments_[segment], it->t0, t);
 }
 
@@ -272,7 +307,8 @@ Curve::Location Curve::locate(double s) const {
   if (local >= whole) return {i, 1};
   if (intervals_[i].empty()) return {i, local / whole};
   const auto& intervals = intervals_[i];
-  auto it = std::lower_bound(intervals.begin(), intervals.end(), local, [](const Interval& interval, double value) { return interval.s1 < value; });
+  auto it = std::lower_bound(intervals.begin(), intervals.end(), local,
+                             [](const Interval& interval, double value) { return interval.s1 < value; });
   if (it == intervals.end()) --it;
   const double span = it->s1 - it->s0;
   if (!(span > 0)) return {i, it->t1};
@@ -336,11 +372,13 @@ Curve::Nearest Curve::nearest(const Point2& p) const {
     // The distance of a cubic has at most five minima: a fine scan, then a golden section around each.
     constexpr int cells = 48;
     std::array<double, cells + 1> distance{};
-    for (int k = 0; k <= cells; ++k) distance[static_cast<std::size_t>(k)] = (position(segment, static_cast<double>(k) / cells) - p).squaredNorm();
+    for (int k = 0; k <= cells; ++k)
+      distance[static_cast<std::size_t>(k)] = (position(segment, static_cast<double>(k) / cells) - p).squaredNorm();
     for (int k = 0; k <= cells; ++k) {
       const auto at = static_cast<std::size_t>(k);
       if ((k > 0 && distance[at - 1] < distance[at]) || (k < cells && distance[at + 1] < distance[at])) continue;
-      double a = std::max(0, k - 1) / static_cast<double>(cells), b = std::min(cells, k + 1) / static_cast<double>(cells);
+      double a = std::max(0, k - 1) / static_cast<double>(cells),
+             b = std::min(cells, k + 1) / static_cast<double>(cells);
       constexpr double golden = 0.6180339887498949;
       double c = b - golden * (b - a), d = a + golden * (b - a);
       double fc = (position(segment, c) - p).squaredNorm(), fd = (position(segment, d) - p).squaredNorm();
@@ -388,13 +426,16 @@ Curve Curve::part(double s0, double s1) const {
     // Nothing shorter than rounding is left over where the cut falls on a segment's end.
     if (t1 - t0 > 1e-12) segments.push_back(pattern::part(segments_[i], t0, t1));
   }
-  if (segments.empty()) segments.push_back(line_segment(position(segments_[a.segment], a.t), position(segments_[b.segment], b.t)));
+  if (segments.empty())
+    segments.push_back(line_segment(position(segments_[a.segment], a.t), position(segments_[b.segment], b.t)));
   segments.front().from = position(segments_[a.segment], a.t);
   segments.back().to = position(segments_[b.segment], b.t);
   return Curve(std::move(segments));
 }
 
-std::pair<Curve, Curve> Curve::split(double s) const { return {part(0, s), part(s, length())}; }
+std::pair<Curve, Curve> Curve::split(double s) const {
+  return {part(0, s), part(s, length())};
+}
 
 double Curve::sector_area() const {
   double area = 0;

@@ -1,13 +1,15 @@
-#include "geometry.h"
-
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
+#include "geometry.h"
+
 namespace toile::pattern {
 namespace {
 
-double cross(const Point2& a, const Point2& b) { return a.x() * b.y() - a.y() * b.x(); }
+double cross(const Point2& a, const Point2& b) {
+  return a.x() * b.y() - a.y() * b.x();
+}
 
 /// Reflection about the line through a along d.
 Similarity reflection(const Point2& a, const Point2& d) {
@@ -18,7 +20,9 @@ Similarity reflection(const Point2& a, const Point2& d) {
   return map;
 }
 
-PanelEdge reversed(const PanelEdge& edge) { return {edge.name, edge.to, edge.from, edge.curve.reversed()}; }
+PanelEdge reversed(const PanelEdge& edge) {
+  return {edge.name, edge.to, edge.from, edge.curve.reversed()};
+}
 
 void reverse_loop(std::vector<PanelEdge>& edges) {
   std::reverse(edges.begin(), edges.end());
@@ -112,7 +116,8 @@ CutPanel mapped(const CutPanel& panel, const Similarity& map) {
 
 /// Both halves of a piece whose outline (counter-clockwise) has the fold edge.
 CutPanel unfolded(CutPanel panel, const std::string& fold_name) {
-  const auto fold_at = std::find_if(panel.outline.begin(), panel.outline.end(), [&](const PanelEdge& edge) { return edge.name == fold_name; });
+  const auto fold_at = std::find_if(panel.outline.begin(), panel.outline.end(),
+                                    [&](const PanelEdge& edge) { return edge.name == fold_name; });
   std::rotate(panel.outline.begin(), fold_at, panel.outline.end());
   const PanelEdge fold = panel.outline.front();
   panel.outline.erase(panel.outline.begin());
@@ -121,7 +126,8 @@ CutPanel unfolded(CutPanel panel, const std::string& fold_name) {
 
   CutPanel other = mapped(panel, reflection(a, d));
   const auto rename_end = [&](std::string& name) {
-    const auto at = std::find_if(panel.points.begin(), panel.points.end(), [&](const PanelPoint& p) { return p.name == name; });
+    const auto at =
+        std::find_if(panel.points.begin(), panel.points.end(), [&](const PanelPoint& p) { return p.name == name; });
     if (!on_fold(at->at)) name += "_m";
   };
   for (PanelEdge& edge : other.outline) edge.name += "_m", rename_end(edge.from), rename_end(edge.to);
@@ -153,9 +159,10 @@ CutPanel unfolded(CutPanel panel, const std::string& fold_name) {
   panel.holes.insert(panel.holes.end(), other.holes.begin(), other.holes.end());
   panel.notches.insert(panel.notches.end(), other.notches.begin(), other.notches.end());
   for (PanelLine& line : other.lines) {
-    const bool inside_fold = std::all_of(line.curve.segments().begin(), line.curve.segments().end(), [&](const Segment& s) {
-      return on_fold(s.from) && on_fold(s.to) && on_fold(position(s, 0.3)) && on_fold(position(s, 0.7));
-    });
+    const bool inside_fold =
+        std::all_of(line.curve.segments().begin(), line.curve.segments().end(), [&](const Segment& s) {
+          return on_fold(s.from) && on_fold(s.to) && on_fold(position(s, 0.3)) && on_fold(position(s, 0.7));
+        });
     if (inside_fold) continue;
     line.name += "_m";
     panel.lines.push_back(line);
@@ -216,10 +223,12 @@ void complete(CutPanel& panel) {
       point.s = nearest.s;
     }
     if (point.where == PanelPoint::Where::border) continue;
-    const bool in_hole = std::any_of(holes.begin(), holes.end(), [&](const Polyline& hole) { return winds_around(hole, point.at); });
+    const bool in_hole =
+        std::any_of(holes.begin(), holes.end(), [&](const Polyline& hole) { return winds_around(hole, point.at); });
     if (!winds_around(border, point.at) || in_hole) point.where = PanelPoint::Where::outside;
   }
-  std::sort(panel.points.begin(), panel.points.end(), [](const PanelPoint& a, const PanelPoint& b) { return a.name < b.name; });
+  std::sort(panel.points.begin(), panel.points.end(),
+            [](const PanelPoint& a, const PanelPoint& b) { return a.name < b.name; });
 }
 
 /// From pattern coordinates to panel coordinates: metres, v along the grain.
@@ -229,7 +238,8 @@ Similarity panel_from_pattern(const Pattern& pattern, const Piece& piece) {
   if (piece.grain) {
     warp = metres.linear * (piece.grain->to - piece.grain->from);
   } else if (piece.fold) {
-    const auto fold = std::find_if(piece.outline.begin(), piece.outline.end(), [&](const Edge& edge) { return edge.name == *piece.fold; });
+    const auto fold = std::find_if(piece.outline.begin(), piece.outline.end(),
+                                   [&](const Edge& edge) { return edge.name == *piece.fold; });
     warp = metres.linear * (fold->segments.back().to - fold->segments.front().from);
     if (warp.y() < 0 || (warp.y() == 0 && warp.x() < 0)) warp = -warp;
   }
@@ -246,7 +256,8 @@ Similarity panel_from_pattern(const Pattern& pattern, const Piece& piece) {
 std::string panel_name(const Piece& piece, int copy) {
   const bool pairs = !piece.identical && !piece.fold;
   const int number = pairs ? copy / 2 : copy;
-  return fmt::format("{}{}{}", piece.name, number > 0 ? fmt::format("_{}", number + 1) : "", pairs && copy % 2 == 1 ? "_m" : "");
+  return fmt::format("{}{}{}", piece.name, number > 0 ? fmt::format("_{}", number + 1) : "",
+                     pairs && copy % 2 == 1 ? "_m" : "");
 }
 
 Result<std::vector<CutPanel>> cut_panels(const Pattern& pattern) {

@@ -32,7 +32,8 @@ double distance_to_segment(const Point2& p, const Point2& a, const Point2& b) {
 
 double distance_to(const Polyline& line, const Point2& p) {
   double best = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i + 1 < line.points.size(); ++i) best = std::min(best, distance_to_segment(p, line.points[i], line.points[i + 1]));
+  for (std::size_t i = 0; i + 1 < line.points.size(); ++i)
+    best = std::min(best, distance_to_segment(p, line.points[i], line.points[i + 1]));
   return best;
 }
 

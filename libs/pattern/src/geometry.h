@@ -1,9 +1,9 @@
 // A piece in metres, as checks and cutting need it. Private to the library.
 #pragma once
 
-#include "toile/pattern/pattern.h"
-
 #include <vector>
+
+#include "toile/pattern/pattern.h"
 
 namespace toile::pattern {
 

@@ -1,9 +1,9 @@
 #include "toile/pattern/pattern.h"
 
-#include "toile/base/text.h"
-
 #include <algorithm>
 #include <cmath>
+
+#include "toile/base/text.h"
 
 namespace toile::pattern {
 namespace {
@@ -32,33 +32,41 @@ std::vector<std::string> edge_names(const Piece& piece) {
 
 double in_metres(LengthUnit unit) {
   switch (unit) {
-    case LengthUnit::mm: return 1e-3;
-    case LengthUnit::cm: return 1e-2;
-    case LengthUnit::m: return 1;
-    case LengthUnit::inch: return 0.0254;
+    case LengthUnit::mm:
+      return 1e-3;
+    case LengthUnit::cm:
+      return 1e-2;
+    case LengthUnit::m:
+      return 1;
+    case LengthUnit::inch:
+      return 0.0254;
   }
   return 1;
 }
 
-Result<Piece> split_edge(const Piece& source, LengthUnit units, const std::string& edge_name, const SplitAt& at, const std::string& first,
-                         const std::string& second, double tolerance) {
+Result<Piece> split_edge(const Piece& source, LengthUnit units, const std::string& edge_name, const SplitAt& at,
+                         const std::string& first, const std::string& second, double tolerance) {
   Piece piece = source;
   const auto issue = [&](const char* code, std::string what, std::string remedy) {
     return Issue{code, {.item = piece.name + "." + edge_name}, std::move(what), std::move(remedy)};
   };
   std::vector<Edge>* loop = loop_with_edge(piece, edge_name);
   if (!loop) return issue("unknown_edge", "there is no such edge to split", suggestion(edge_name, edge_names(piece)));
-  const auto edge_at = std::find_if(loop->begin(), loop->end(), [&](const Edge& edge) { return edge.name == edge_name; });
+  const auto edge_at =
+      std::find_if(loop->begin(), loop->end(), [&](const Edge& edge) { return edge.name == edge_name; });
   const Edge edge = *edge_at;
   for (const std::string& name : {first, second}) {
     const std::vector<std::string> names = edge_names(piece);
-    const bool line = std::any_of(piece.lines.begin(), piece.lines.end(), [&](const InternalLine& l) { return l.name == name; });
+    const bool line =
+        std::any_of(piece.lines.begin(), piece.lines.end(), [&](const InternalLine& l) { return l.name == name; });
     if (first == second || line || (name != edge_name && std::count(names.begin(), names.end(), name) > 0)) {
-      return issue("duplicate_name", fmt::format("the name '{}' for one of the parts is used twice", name), "give both parts names of their own");
+      return issue("duplicate_name", fmt::format("the name '{}' for one of the parts is used twice", name),
+                   "give both parts names of their own");
     }
   }
   if (edge.segments.empty()) return issue("broken_edge", "it has no segments", "give it at least one line or curve");
-  if (piece.fold == edge_name) return issue("split_fold", "it lies on the fold, which is one straight edge", "name a point on it instead");
+  if (piece.fold == edge_name)
+    return issue("split_fold", "it lies on the fold, which is one straight edge", "name a point on it instead");
 
   const Curve curve(edge.segments);
   const double scale = in_metres(units);
@@ -70,23 +78,29 @@ Result<Piece> split_edge(const Piece& source, LengthUnit units, const std::strin
     if (!at.position && known == piece.points.end()) {
       std::vector<std::string> names;
       for (const auto& [name, p] : piece.points) names.push_back(name);
-      return issue("unknown_point", fmt::format("there is no point '{}' to split at", at.point), suggestion(at.point, names));
+      return issue("unknown_point", fmt::format("there is no point '{}' to split at", at.point),
+                   suggestion(at.point, names));
     }
     const Point2 wanted = at.position ? *at.position : known->second;
     const Curve::Nearest nearest = curve.nearest(wanted);
     if (!(nearest.distance * scale <= tolerance)) {
-      return issue("point_off_edge", fmt::format("point '{}' ({:.6g}, {:.6g}) is {:.4g} mm away from the edge", at.point, wanted.x(), wanted.y(), nearest.distance * scale * 1e3),
-                   fmt::format("move it onto the edge (nearest: ({:.6g}, {:.6g}))", nearest.point.x(), nearest.point.y()));
+      return issue(
+          "point_off_edge",
+          fmt::format("point '{}' ({:.6g}, {:.6g}) is {:.4g} mm away from the edge", at.point, wanted.x(), wanted.y(),
+                      nearest.distance * scale * 1e3),
+          fmt::format("move it onto the edge (nearest: ({:.6g}, {:.6g}))", nearest.point.x(), nearest.point.y()));
     }
     s = nearest.s;
   }
   if (!(s * scale > 1e-6 && (curve.length() - s) * scale > 1e-6)) {
-    return issue("split_at_end", fmt::format("it cannot be split at {:.6g} of its length {:.6g}", s, curve.length()), "split between its ends");
+    return issue("split_at_end", fmt::format("it cannot be split at {:.6g} of its length {:.6g}", s, curve.length()),
+                 "split between its ends");
   }
   const auto [before, after] = curve.split(s);
   const Point2 where = before.to();
   if (at.distance && known != piece.points.end() && !((known->second - where).norm() * scale <= tolerance)) {
-    return issue("duplicate_name", fmt::format("there is a point '{}' elsewhere", at.point), "choose another name for the point of the split");
+    return issue("duplicate_name", fmt::format("there is a point '{}' elsewhere", at.point),
+                 "choose another name for the point of the split");
   }
   piece.points[at.point] = where;
   Edge a = edge, b = edge;

@@ -1,14 +1,14 @@
 // Patterns from other programs (docs/pattern.md, "Import").
 #pragma once
 
-#include "toile/base/fields.h"
-#include "toile/pattern/pattern.h"
-
 #include <map>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "toile/base/fields.h"
+#include "toile/pattern/pattern.h"
 
 namespace toile::io {
 
@@ -19,7 +19,12 @@ struct ImportSplit {
   std::string first, second;
   static void describe(auto& f) {
     f(&ImportSplit::edge, {.key = "edge", .doc = "edge to cut in two", .required = true});
-    f(&ImportSplit::distance, {.key = "distance", .doc = "from the edge's first point; negative: before its last", .unit = "m", .min = -100, .max = 100, .required = true});
+    f(&ImportSplit::distance, {.key = "distance",
+                               .doc = "from the edge's first point; negative: before its last",
+                               .unit = "m",
+                               .min = -100,
+                               .max = 100,
+                               .required = true});
     f(&ImportSplit::point, {.key = "point", .doc = "name of the point made there", .required = true});
     f(&ImportSplit::first, {.key = "first", .doc = "name of the first part", .required = true});
     f(&ImportSplit::second, {.key = "second", .doc = "name of the second part", .required = true});
@@ -43,7 +48,8 @@ struct ImportLine {
     f(&ImportLine::run, {.key = "run", .doc = "or straight lines through points: a>b>c"});
     f(&ImportLine::kind, {.key = "kind", .doc = "what the line is"});
     f.check([](const ImportLine& line, Issues& issues) {
-      if (line.path.empty() == line.run.empty()) issues.push_back(Issue{"bad_line", {.item = "path"}, "a line is given by a path or a run", "give one of them"});
+      if (line.path.empty() == line.run.empty())
+        issues.push_back(Issue{"bad_line", {.item = "path"}, "a line is given by a path or a run", "give one of them"});
     });
   }
 };
@@ -55,8 +61,10 @@ struct ImportNotch {
   static void describe(auto& f) {
     f(&ImportNotch::edge, {.key = "edge", .doc = "edge that has the notch", .required = true});
     f(&ImportNotch::point, {.key = "point", .doc = "drafted point on the edge"});
-    f(&ImportNotch::distance, {.key = "distance", .doc = "or from the edge's first point; negative: before its last", .unit = "m"});
-    f(&ImportNotch::fraction, {.key = "fraction", .doc = "or a fraction of the edge's length", .unit = "1", .min = 0, .max = 1});
+    f(&ImportNotch::distance,
+      {.key = "distance", .doc = "or from the edge's first point; negative: before its last", .unit = "m"});
+    f(&ImportNotch::fraction,
+      {.key = "fraction", .doc = "or a fraction of the edge's length", .unit = "1", .min = 0, .max = 1});
   }
 };
 
@@ -79,14 +87,19 @@ struct ImportPiece {
   static void describe(auto& f) {
     f(&ImportPiece::name, {.key = "name", .doc = "name of the piece", .required = true});
     f(&ImportPiece::part, {.key = "part", .doc = "part of the draft", .required = true});
-    f(&ImportPiece::path, {.key = "path", .doc = "path that is the seam line; without it `seam`, else the only one drawn"});
-    f(&ImportPiece::material, {.key = "material", .doc = "which material of the cut list it is cut from; without it the first"});
-    f(&ImportPiece::cut, {.key = "cut", .doc = "how many are cut; without it as the cut list says", .min = 1, .max = 1000});
+    f(&ImportPiece::path,
+      {.key = "path", .doc = "path that is the seam line; without it `seam`, else the only one drawn"});
+    f(&ImportPiece::material,
+      {.key = "material", .doc = "which material of the cut list it is cut from; without it the first"});
+    f(&ImportPiece::cut,
+      {.key = "cut", .doc = "how many are cut; without it as the cut list says", .min = 1, .max = 1000});
     f(&ImportPiece::identical, {.key = "identical", .doc = "all copies alike instead of mirrored pairs"});
     f(&ImportPiece::fold, {.key = "fold", .doc = "edge on the fold, or none; without it as the draft says"});
     f(&ImportPiece::grain, {.key = "grain", .doc = "x, y (up), fold, or two points a>b; without it as the draft says"});
-    f(&ImportPiece::edges, {.key = "edges", .doc = "edges of the outline: name -> run of points a>b>c; others are named by their ends"});
-    f(&ImportPiece::shortcuts, {.key = "shortcuts", .doc = "parts of the outline, a>b in its direction, that become straight"});
+    f(&ImportPiece::edges,
+      {.key = "edges", .doc = "edges of the outline: name -> run of points a>b>c; others are named by their ends"});
+    f(&ImportPiece::shortcuts,
+      {.key = "shortcuts", .doc = "parts of the outline, a>b in its direction, that become straight"});
     f(&ImportPiece::splits, {.key = "splits", .doc = "cuts of edges where no point is"});
     f(&ImportPiece::holes, {.key = "holes", .doc = "closed paths cut out, by name"});
     f(&ImportPiece::lines, {.key = "lines", .doc = "internal lines, by name"});
@@ -102,9 +115,16 @@ struct ImportParams {
   std::vector<ImportPiece> pieces;
   static void describe(auto& f) {
     f(&ImportParams::name, {.key = "name", .doc = "name of the pattern; without it the design's"});
-    f(&ImportParams::origin, {.key = "origin", .doc = "where the pattern comes from and its licence; without it the program and design"});
-    f(&ImportParams::tolerance, {.key = "tolerance", .doc = "distance within which a drafted point lies on a line", .unit = "m", .min = 1e-7, .max = 0.01});
-    f(&ImportParams::pieces, {.key = "pieces", .doc = "pieces to take; without any, all parts with edges named by their ends (a missing grain is taken as up the page)"});
+    f(&ImportParams::origin,
+      {.key = "origin", .doc = "where the pattern comes from and its licence; without it the program and design"});
+    f(&ImportParams::tolerance, {.key = "tolerance",
+                                 .doc = "distance within which a drafted point lies on a line",
+                                 .unit = "m",
+                                 .min = 1e-7,
+                                 .max = 0.01});
+    f(&ImportParams::pieces, {.key = "pieces",
+                              .doc = "pieces to take; without any, all parts with edges named by their ends (a missing "
+                                     "grain is taken as up the page)"});
   }
 };
 
@@ -122,7 +142,10 @@ Result<ImportedPattern> import_freesewing(std::string_view json, const std::stri
 
 template <>
 struct toile::Choices<toile::pattern::LineKind> {
-  static constexpr std::array names{std::pair{"fold", toile::pattern::LineKind::fold},           std::pair{"dart", toile::pattern::LineKind::dart},
-                                    std::pair{"placement", toile::pattern::LineKind::placement}, std::pair{"stitch", toile::pattern::LineKind::stitch},
-                                    std::pair{"cut", toile::pattern::LineKind::cut},             std::pair{"other", toile::pattern::LineKind::other}};
+  static constexpr std::array names{std::pair{"fold", toile::pattern::LineKind::fold},
+                                    std::pair{"dart", toile::pattern::LineKind::dart},
+                                    std::pair{"placement", toile::pattern::LineKind::placement},
+                                    std::pair{"stitch", toile::pattern::LineKind::stitch},
+                                    std::pair{"cut", toile::pattern::LineKind::cut},
+                                    std::pair{"other", toile::pattern::LineKind::other}};
 };

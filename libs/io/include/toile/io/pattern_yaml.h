@@ -1,12 +1,12 @@
 // Pattern files: YAML by hand or by program (docs/pattern.md).
 #pragma once
 
-#include "toile/base/result.h"
-#include "toile/pattern/pattern.h"
-
 #include <map>
 #include <string>
 #include <string_view>
+
+#include "toile/base/result.h"
+#include "toile/pattern/pattern.h"
 
 namespace toile::io {
 
@@ -26,8 +26,8 @@ Issues check(const PatternFile& file);
 Result<pattern::Pattern> parse_pattern(std::string_view yaml, const std::string& file);
 Result<pattern::Pattern> read_pattern(const std::string& path);
 
-/// The pattern as YAML; reading it back gives an equal pattern, bit by bit, where edges end exactly at their points (those
-/// that end within the weld tolerance of them do so after reading).
+/// The pattern as YAML; reading it back gives an equal pattern, bit by bit, where edges end exactly at their points
+/// (those that end within the weld tolerance of them do so after reading).
 std::string format_pattern(const pattern::Pattern& pattern);
 
 }  // namespace toile::io

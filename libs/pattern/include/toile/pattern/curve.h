@@ -1,11 +1,11 @@
 // Plane curves of lines, Bezier curves and circular arcs, by arc length.
 #pragma once
 
-#include "toile/base/result.h"
-
 #include <Eigen/Core>
 #include <utility>
 #include <vector>
+
+#include "toile/base/result.h"
 
 namespace toile::pattern {
 

@@ -1,13 +1,13 @@
 // Pattern pieces as a pattern maker draws them, their checks, and the panels that are cut from them.
 #pragma once
 
-#include "toile/pattern/curve.h"
-
 #include <map>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "toile/pattern/curve.h"
 
 namespace toile::pattern {
 
@@ -19,8 +19,8 @@ double in_metres(LengthUnit unit);
 struct Edge {
   std::string name;  ///< unique in its piece (holes and internal lines included)
   std::string from, to;
-  std::vector<Segment> segments;     ///< from the first point to the second
-  std::optional<double> allowance;   ///< seam allowance [pattern units]; without it the piece's
+  std::vector<Segment> segments;    ///< from the first point to the second
+  std::optional<double> allowance;  ///< seam allowance [pattern units]; without it the piece's
   bool operator==(const Edge&) const = default;
 };
 
@@ -45,9 +45,9 @@ struct InternalLine {
 struct Notch {
   std::string name;  ///< unique among the piece's notches
   std::string edge;
-  std::optional<std::string> point;   ///< a named point on the edge
-  std::optional<double> distance;     ///< from the edge's first point [pattern units]; negative: from its last
-  std::optional<double> fraction;     ///< of the edge's length, 0..1
+  std::optional<std::string> point;  ///< a named point on the edge
+  std::optional<double> distance;    ///< from the edge's first point [pattern units]; negative: from its last
+  std::optional<double> fraction;    ///< of the edge's length, 0..1
   bool operator==(const Notch&) const = default;
 };
 
@@ -76,11 +76,11 @@ struct Piece {
   std::vector<InternalLine> lines;
   std::vector<Notch> notches;
   std::vector<Mark> marks;
-  std::optional<Grain> grain;        ///< without it the fold edge is the grain line
-  std::optional<std::string> fold;   ///< edge that lies on the fold of the cloth
-  int copies = 1;                    ///< how many are cut
-  bool identical = false;            ///< all copies alike; otherwise every second one is mirrored
-  std::optional<double> allowance;   ///< seam allowance [pattern units]
+  std::optional<Grain> grain;       ///< without it the fold edge is the grain line
+  std::optional<std::string> fold;  ///< edge that lies on the fold of the cloth
+  int copies = 1;                   ///< how many are cut
+  bool identical = false;           ///< all copies alike; otherwise every second one is mirrored
+  std::optional<double> allowance;  ///< seam allowance [pattern units]
   bool operator==(const Piece&) const = default;
 };
 
@@ -114,8 +114,8 @@ inline constexpr double on_edge_tolerance = 1e-4;
 /// of the split is moved onto the curve. Notches follow their half.
 /// tolerance  largest distance of the point from the edge [m]
 /// error      Issue "unknown_edge", "unknown_point", "point_off_edge", "split_at_end", "split_fold", "duplicate_name"
-Result<Piece> split_edge(const Piece& piece, LengthUnit units, const std::string& edge, const SplitAt& at, const std::string& first,
-                         const std::string& second, double tolerance = on_edge_tolerance);
+Result<Piece> split_edge(const Piece& piece, LengthUnit units, const std::string& edge, const SplitAt& at,
+                         const std::string& first, const std::string& second, double tolerance = on_edge_tolerance);
 
 // ---------------------------------------------------------------------------------------------------------------
 // What lies on the cutting table. All lengths in metres from here on.
@@ -161,7 +161,7 @@ struct PanelMark {
 
 /// One physical panel in panel coordinates (u, v): v along the grain, face side seen with u right and v up.
 struct CutPanel {
-  std::string name;      ///< `sleeve`, `sleeve_m`; further pairs `sleeve_2`, `sleeve_2_m`
+  std::string name;  ///< `sleeve`, `sleeve_m`; further pairs `sleeve_2`, `sleeve_2_m`
   std::string piece;
   std::string material;
   bool mirrored = false;
@@ -182,8 +182,8 @@ std::string panel_name(const Piece& piece, int copy);
 
 /// The panels of a pattern, in the order of its pieces and copies. A piece on the fold becomes one panel: the fold edge
 /// vanishes, everything of the other half has the suffix `_m`, what lies on the fold stays single; its copies are all
-/// alike. A mirrored copy keeps its edge names. Edges of mirrored halves and copies run the other way, as do those of an
-/// outline drawn clockwise. v runs from `grain.from` to `grain.to`, or up the drawing where the fold is the grain.
+/// alike. A mirrored copy keeps its edge names. Edges of mirrored halves and copies run the other way, as do those of
+/// an outline drawn clockwise. v runs from `grain.from` to `grain.to`, or up the drawing where the fold is the grain.
 /// error  all issues of check()
 Result<std::vector<CutPanel>> cut_panels(const Pattern& pattern);
 
