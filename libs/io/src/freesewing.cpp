@@ -231,10 +231,27 @@ class PieceImport {
     import_buttons(notes);
     if (!issues_.empty()) return issues_;
     append(notes, assumed_);
+    round_coordinates();
     return std::move(piece_);
   }
 
  private:
+  /// Points and controls made by splitting get as many digits as drafted ones: 1e-6 mm.
+  void round_coordinates() {
+    const auto round = [](Point2& p) {
+      for (double& value : p) value = std::round(value * 1e6) / 1e6 + 0.0;
+    };
+    const auto round_segments = [&](std::vector<Segment>& segments) {
+      for (Segment& s : segments) round(s.from), round(s.to), round(s.control_1), round(s.control_2);
+    };
+    for (auto& [name, p] : piece_.points) round(p);
+    for (pattern::Edge& edge : piece_.outline) round_segments(edge.segments);
+    for (pattern::Hole& hole : piece_.holes) {
+      for (pattern::Edge& edge : hole.edges) round_segments(edge.segments);
+    }
+    for (pattern::InternalLine& line : piece_.lines) round_segments(line.segments);
+    for (pattern::Mark& mark : piece_.marks) round(mark.at);
+  }
   /// A gap in the draft: an issue, or a note with what is assumed.
   void gap(const char* code, const std::string& what_part, const std::string& what, const std::string& remedy,
            const std::string& assumption) {
@@ -372,19 +389,31 @@ class PieceImport {
     return p ? node_at(loop, *p) : std::nullopt;
   }
 
+  /// Lines through the points of a run take the place of the outline from its first to its last point.
   void take_shortcut(Loop& loop, const std::string& text) {
     const std::vector<std::string> names = run_points(text);
-    if (names.size() != 2)
-      return report("bad_run", "shortcuts", fmt::format("'{}' is no shortcut", text), "write two points: a>b");
-    if (!insert_node(loop, names[0], "shortcuts") || !insert_node(loop, names[1], "shortcuts")) return;
-    const std::size_t a = *node_of(loop, names[0]), b = *node_of(loop, names[1]);
-    if (a == b)
+    if (names.size() < 2) {
+      return report("bad_run", "shortcuts", fmt::format("'{}' is no shortcut", text), "write at least two points: a>b");
+    }
+    std::vector<Point2> corners;
+    for (const std::string& name : names) {
+      const Point2* p = part_.find(name);
+      if (!p) return unknown_point("shortcuts", name);
+      corners.push_back(*p);
+    }
+    if (!insert_node(loop, names.front(), "shortcuts") || !insert_node(loop, names.back(), "shortcuts")) return;
+    const std::size_t a = *node_of(loop, names.front()), b = *node_of(loop, names.back());
+    if (a == b) {
       return report("bad_run", "shortcuts", fmt::format("'{}' starts and ends at the same point", text),
-                    "write two points: a>b");
-    std::vector<Segment> kept{pattern::line_segment(loop.node(a), loop.node(b))};
+                    "write two different points: a>b");
+    }
+    corners.front() = loop.node(a);
+    corners.back() = loop.node(b);
+    std::vector<Segment> kept;
+    for (std::size_t i = 0; i + 1 < corners.size(); ++i) {
+      kept.push_back(pattern::line_segment(corners[i], corners[i + 1]));
+    }
     for (std::size_t i = b; i != a; i = (i + 1) % loop.size()) kept.push_back(loop.segments[i]);
-    if (kept.size() < 2)
-      return report("bad_run", "shortcuts", fmt::format("'{}' leaves nothing of the outline", text), "swap its points");
     loop.segments = std::move(kept);
   }
 

@@ -99,7 +99,7 @@ struct ImportPiece {
     f(&ImportPiece::edges,
       {.key = "edges", .doc = "edges of the outline: name -> run of points a>b>c; others are named by their ends"});
     f(&ImportPiece::shortcuts,
-      {.key = "shortcuts", .doc = "parts of the outline, a>b in its direction, that become straight"});
+      {.key = "shortcuts", .doc = "runs a>b>c of straight lines that replace the outline from a to c, in its direction"});
     f(&ImportPiece::splits, {.key = "splits", .doc = "cuts of edges where no point is"});
     f(&ImportPiece::holes, {.key = "holes", .doc = "closed paths cut out, by name"});
     f(&ImportPiece::lines, {.key = "lines", .doc = "internal lines, by name"});
