@@ -1,8 +1,10 @@
 // The search against brute force, and what a limited step guarantees, on soups, folded sheets and supports.
 #include "toile/contact/search.h"
 
+#include "contact_drape.h"
 #include "contact_shapes.h"
 #include "toile/base/parallel.h"
+#include "toile/base/result.h"
 #include "toile/base/rng.h"
 #include "toile/contact/distance.h"
 #include "toile/contact/exact.h"
@@ -323,8 +325,186 @@ TEST(ContactLimit, CrumpledSheetNeverIntersects) {
     EXPECT_GT(limited, 1000);
     EXPECT_GT(would_intersect, steps / 2);
     EXPECT_GT(kept / steps, 0.3);
-    printf("kept %.3f limited %d least %.2e\n", kept / steps, limited, least_distance(surface, x));
   }
+}
+
+bool same_contacts(std::span<const Contact> p, std::span<const Contact> q) {
+  return std::equal(p.begin(), p.end(), q.begin(), q.end(), [](const Contact& a, const Contact& b) {
+    return a.kind == b.kind && a.a == b.a && a.b == b.b && a.node == b.node && a.weight == b.weight && a.distance == b.distance && a.share == b.share;
+  });
+}
+
+// A search that has lists from earlier calls gives the very same bytes as a new one, at any pace of motion.
+TEST(ContactSearch, ResultsDoNotDependOnEarlierCalls) {
+  Rng rng(41);
+  const Shape body = test::ellipsoid(Vec(0.3, 0.2, 0.25), Vec(0.5, 0.5, -0.2), 14, 18);
+  const Shape cloth = pleated(31, 0.1, 0.016);
+  const Surface cs = make_surface(static_cast<int>(cloth.x.rows()), cloth.faces), ss = make_surface(static_cast<int>(body.x.rows()), body.faces);
+  Search used(cs, cloth.x, ss, body.x);
+  Points3 x = cloth.x, s = body.x;
+  for (int step = 0; step < 60; ++step) {
+    SCOPED_TRACE(step);
+    const double pace = std::pow(10.0, rng.uniform(-5, -1.5));
+    Points3 target = x + smooth_noise(rng, cloth.x, pace, 0.5);
+    target.rowwise() += random_vec(rng, pace).transpose();
+    Points3 body_target = s;
+    if (step % 3 == 1) body_target.rowwise() += random_vec(rng, 0.5 * pace).transpose();
+    const Radii radii{rng.uniform(0.002, 0.02), rng.uniform(0.002, 0.03)};
+    Search fresh(cs, target, ss, body.x);  // another layout of the hierarchy, too
+    const Contacts p = used.proximity(x, s, radii), q = fresh.proximity(x, s, radii);
+    ASSERT_TRUE(same_contacts(p.self, q.self));
+    ASSERT_TRUE(same_contacts(p.support, q.support));
+    Search fresh_again(cs, cloth.x, ss, body.x);
+    ASSERT_EQ(used.step_fraction(x, target, s, body_target), fresh_again.step_fraction(x, target, s, body_target));
+    const StepLimit& a = used.limit_step(x, target, s, body_target);
+    const StepLimit& b = fresh_again.limit_step(x, target, s, body_target);
+    ASSERT_EQ(a.x, b.x);
+    ASSERT_EQ(a.fraction, b.fraction);
+    ASSERT_EQ(a.support_fraction, b.support_fraction);
+    ASSERT_EQ(a.limited_pairs, b.limited_pairs);
+    s += a.support_fraction * (body_target - s);
+    x = a.x;
+  }
+}
+
+// Cloth thrown at sharp and smooth supports, coarse and fine, still and moving: never inside, never cut.
+TEST(ContactLimit, NeverCutsASupport) {
+  const Shape bodies[] = {test::block(Vec(-0.2, -0.3, -0.3), Vec(0.25, 0.3, -0.02)), test::ellipsoid(Vec(0.3, 0.3, 0.05), Vec(0, 0, -0.08), 8, 10),
+                          test::ellipsoid(Vec(0.01, 0.01, 0.3), Vec(0.013, 0.017, -0.32), 20, 8)};  // the last: a needle
+  for (std::size_t which = 0; which < 3; ++which) {
+    for (const bool moving : {false, true}) {
+      SCOPED_TRACE(testing::Message() << "body " << which << " moving " << moving);
+      Rng rng(50 + which);
+      const Shape& body = bodies[which];
+      const Shape cloth = test::sheet(21, 21, 0.8, 0.8, [](double u, double v) { return Vec(u - 0.4, v - 0.4, 0); });
+      const Surface cs = make_surface(static_cast<int>(cloth.x.rows()), cloth.faces), ss = make_surface(static_cast<int>(body.x.rows()), body.faces);
+      Search search(cs, cloth.x, ss, body.x);
+      Points3 x = cloth.x, s = body.x;
+      ASSERT_TRUE(support_intersections(cs, x, ss, s).empty());
+      int limited = 0;
+      double support_way = 0;
+      for (int step = 0; step < 25; ++step) {
+        Points3 target = x + smooth_noise(rng, cloth.x, 0.01, 0.4);
+        for (Eigen::Index i = 0; i < x.rows(); ++i) target.row(i) += random_vec(rng, 0.003).transpose();
+        target.col(2).array() -= 0.02;
+        Points3 body_target = s;
+        if (moving) body_target.rowwise() += Vec(rng.uniform(-0.01, 0.01), rng.uniform(-0.01, 0.01), rng.uniform(-0.005, 0.02)).transpose();
+        const StepLimit& limit = search.limit_step(x, target, s, body_target);
+        limited += limit.limited_pairs;
+        ASSERT_EQ(limit.touching_pairs, 0);
+        if (!moving) {
+          ASSERT_EQ(limit.support_fraction, 1);
+        }
+        support_way += limit.support_fraction;
+        for (const double t : {0.25, 0.5, 0.75, 1.0}) {
+          const Points3 y = x + t * (limit.x - x), sy = s + t * limit.support_fraction * (body_target - s);
+          ASSERT_TRUE(support_intersections(cs, y, ss, sy).empty()) << "step " << step << " time " << t;
+          ASSERT_TRUE(self_intersections(cs, y).empty()) << "step " << step << " time " << t;
+        }
+        x = limit.x;
+        s += limit.support_fraction * (body_target - s);
+      }
+      EXPECT_GT(limited, 50);
+      EXPECT_GT(moving ? support_way : (cloth.x - x).norm(), 0.1);
+    }
+  }
+}
+
+// Where nothing is in the way a step is taken as it is.
+TEST(ContactLimit, FreeMotionIsNotTouched) {
+  const Shape body = test::block(Vec(-0.2, -0.3, -0.3), Vec(0.25, 0.3, -0.02));
+  const Shape cloth = test::sheet(21, 21, 0.8, 0.8, [](double u, double v) { return Vec(u - 0.4, v - 0.4, 0); });
+  Search search(make_surface(441, cloth.faces), cloth.x, make_surface(8, body.faces), body.x);
+  Points3 target = cloth.x;
+  target.rowwise() += Eigen::RowVector3d(3, 0.1, 0.2);
+  const StepLimit& limit = search.limit_step(cloth.x, target, body.x, body.x);
+  EXPECT_EQ(limit.x, target);
+  EXPECT_EQ(limit.limited_nodes, 0);
+  EXPECT_EQ(limit.least_fraction, 1);
+  // Sliding along the support just outside the separation is free as well.
+  Points3 resting = cloth.x;
+  resting.col(2).array() -= 0.02 - 6e-5;
+  Points3 slid = resting;
+  slid.col(0).array() += 0.05;
+  const StepLimit& slide = search.limit_step(resting, slid, body.x, body.x);
+  EXPECT_EQ(slide.limited_nodes, 0);
+  EXPECT_EQ(search.step_fraction(resting, slid, body.x, body.x), 1);
+}
+
+// Only the nodes in the way are held back, and the one fraction for all is that of the first impact.
+TEST(ContactLimit, RewindsLocally) {
+  const Shape body = test::ellipsoid(Vec(0.05, 0.05, 0.05), Vec(0, 0, -0.06), 12, 16);
+  const Shape cloth = test::sheet(41, 41, 1, 1, [](double u, double v) { return Vec(u - 0.5, v - 0.5, 0); });
+  Search search(make_surface(1681, cloth.faces), cloth.x, make_surface(static_cast<int>(body.x.rows()), body.faces), body.x);
+  Points3 target = cloth.x;
+  target.col(2).array() -= 0.05;
+  const StepLimit& limit = search.limit_step(cloth.x, target, body.x, body.x);
+  EXPECT_GT(limit.limited_nodes, 5);
+  EXPECT_LT(limit.limited_nodes, 60);
+  EXPECT_GT(limit.least_fraction, 0.15);
+  EXPECT_EQ(limit.fallback_pairs, 0);
+  EXPECT_NEAR(search.step_fraction(cloth.x, target, body.x, body.x), 0.2, 0.003);
+}
+
+// Exempt nodes pass where others are stopped; neighbours across an open seam never stop one another.
+TEST(ContactLimit, ExemptNodesAndOpenSeams) {
+  Shape cloth = test::joined(test::sheet(6, 6, 0.1, 0.1, [](double u, double v) { return Vec(u, v, 0); }),
+                             test::sheet(6, 6, 0.1, 0.1, [](double u, double v) { return Vec(u + 0.003, v + 0.002, 0.01); }));
+  Points3 target = cloth.x;
+  target.bottomRows(36).col(2).array() -= 0.02;
+  const Points3 none(0, 3);
+  Search search(make_surface(72, cloth.faces), cloth.x);
+  EXPECT_GT(search.limit_step(cloth.x, target, none, none).limited_nodes, 50);
+  EXPECT_TRUE(self_intersections(search.cloth(), search.limit_step(cloth.x, target, none, none).x).empty());
+  LimitOptions options;
+  std::vector<std::uint8_t> exempt(72, 1);
+  options.self_exempt = exempt;
+  EXPECT_EQ(search.limit_step(cloth.x, target, none, none, options).limited_nodes, 0);
+  for (int i = 0; i < 36; ++i) exempt[i] = 0;  // one side is not enough
+  EXPECT_GT(search.limit_step(cloth.x, target, none, none, options).limited_nodes, 50);
+  Ids one = Ids::Zero(72);
+  Search welded(make_surface(72, cloth.faces, one), cloth.x);
+  EXPECT_EQ(welded.limit_step(cloth.x, target, none, none).limited_nodes, 0);
+  EXPECT_TRUE(welded.proximity(cloth.x, none, {0.1, 0.1}).self.empty());
+}
+
+// A broken precondition is reported and ends all the same.
+TEST(ContactLimit, TouchingStartIsReported) {
+  Shape cloth = test::joined(test::sheet(6, 6, 0.1, 0.1, [](double u, double v) { return Vec(u, v, 0); }),
+                             test::sheet(6, 6, 0.1, 0.1, [](double u, double v) { return Vec(u, v, 0); }));
+  Points3 target = cloth.x;
+  target.bottomRows(36).col(2).array() -= 0.02;
+  const Points3 none(0, 3);
+  Search search(make_surface(72, cloth.faces), cloth.x);
+  const StepLimit& limit = search.limit_step(cloth.x, target, none, none);
+  EXPECT_GT(limit.touching_pairs, 36);
+  EXPECT_TRUE(limit.x.allFinite());
+  Points3 bad = cloth.x;
+  bad(3, 1) = NAN;
+  EXPECT_THROW(search.limit_step(cloth.x, bad, none, none), CheckFailed);
+}
+
+// A sheet drops over a small ball and folds on itself, hundreds of steps long.
+TEST(ContactLimit, DrapeStaysClean) {
+  const Shape cloth = test::sheet(36, 36, 0.6, 0.6, [](double u, double v) { return Vec(u - 0.3, v - 0.3, 0.105); });
+  const Shape ball = test::ellipsoid(Vec(0.1, 0.1, 0.1), Vec::Zero(), 16, 18);
+  test::Drape drape(cloth, ball);
+  drape.sweeps = 12;
+  double kept = 0;
+  const int steps = 160;
+  std::size_t most_contacts = 0;
+  for (int step = 0; step < steps; ++step) {
+    drape.advance();
+    ASSERT_EQ(drape.last.touching_pairs, 0);
+    for (const double f : drape.last.fraction) kept += f / static_cast<double>(drape.last.fraction.size()) / steps;
+    if (step % 10 == 9) {
+      ASSERT_TRUE(self_intersections(drape.surface, drape.x).empty()) << "step " << step;
+      ASSERT_TRUE(support_intersections(drape.surface, drape.x, drape.search.support(), drape.support_x).empty()) << "step " << step;
+      most_contacts = std::max(most_contacts, drape.search.proximity(drape.x, drape.support_x, {0.002, 0}).self.size());
+    }
+  }
+  EXPECT_GT(most_contacts, 50u);
+  EXPECT_GT(kept, 0.97);
 }
 
 }  // namespace

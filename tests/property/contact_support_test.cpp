@@ -125,7 +125,7 @@ TEST(SupportField, MovesWithItsMesh) {
     const Vec p = shift + random_vec(rng, 0.4);
     ASSERT_EQ(field.nearest(p).distance, fresh.nearest(p).distance);
     ASSERT_EQ(field.nearest(p).face, fresh.nearest(p).face);
-    ASSERT_NEAR(field.winding_number(p), fresh.winding_number(p), 1e-12);
+    ASSERT_NEAR(field.winding_number(p), brute_winding({moved, shape.faces}, p), 0.05);
   }
 }
 

@@ -70,9 +70,26 @@ struct Search::Impl {
   // proximity
   Positions cloth_at, support_at;
   std::vector<Chunk> chunks;
-  std::vector<Contact> found[5], sorted[5];
+  struct KindScratch {
+    std::vector<Contact> sorted;
+    std::vector<int> bucket;
+    std::vector<Vec> directions;
+    std::vector<std::array<int, 3>> patch_faces;
+  };
+  KindScratch scratch[5];
   std::vector<Contact> self_contacts, support_contacts;
-  std::vector<int> bucket;
+
+  // Pairs that were nearer than `reach` at the reference positions. While no node has moved far from its reference since,
+  // every pair of interest is among them and the hierarchies need not be asked.
+  struct NearList {
+    bool valid = false;
+    double reach = 0;
+    std::vector<Vec> reference, support_reference;
+    std::vector<Vec> previous, support_previous;  // positions of the last call: how fast things move
+    std::vector<std::array<std::vector<Candidate>, 5>> chunks;
+  };
+  NearList near_self, near_support;
+  double slack = 0;  // what a list reaches beyond the radius asked for [m]
 
   // steps
   Positions cloth_from, cloth_to, support_from, support_to;
@@ -111,14 +128,6 @@ struct Search::Impl {
     for (int k = 0; k < 4; ++k) x[k] = n.of_support[k] ? support_x[n.id[k]] : cloth_x[n.id[k]];
     return x;
   }
-  bool neighbours(int vertex, const std::array<int, 3>& face) const {
-    const auto& a = cloth_tree.adjacency;
-    return a[vertex] == a[face[0]] || a[vertex] == a[face[1]] || a[vertex] == a[face[2]];
-  }
-  bool neighbours(const std::array<int, 2>& e, const std::array<int, 2>& f) const {
-    const auto& a = cloth_tree.adjacency;
-    return a[e[0]] == a[f[0]] || a[e[0]] == a[f[1]] || a[e[1]] == a[f[0]] || a[e[1]] == a[f[1]];
-  }
   template <Kind kind>
   static constexpr PairType type() {
     return is_edge_pair(kind) ? PairType::edge_edge : PairType::vertex_face;
@@ -135,17 +144,25 @@ struct Search::Impl {
     const Boxes& boxes = self_boxes;
     parallel_chunks(t.leaf_count(), leaf_grain, [&](std::size_t begin, std::size_t end) {
       Chunk& chunk = chunks[begin / leaf_grain];
-      const auto vertex_face = [&](int v, int f) {
-        if (!neighbours(v, t.face[f])) body.template operator()<Kind::vertex_face>(chunk, Candidate{v, f});
-      };
-      const auto face_vertex = [&](int f, int v) { vertex_face(v, f); };
-      const auto edge_edge = [&](int e, int f) {
-        if (!neighbours(t.edge[e], t.edge[f])) body.template operator()<Kind::edge_edge>(chunk, ordered_edges(e, f));
+      LeafPairs pairs;
+      const auto work_off = [&] {
+        for (int i = 0; i < pairs.vertex_face.size; ++i) {
+          body.template operator()<Kind::vertex_face>(chunk, Candidate{pairs.vertex_face.pair[i][0], pairs.vertex_face.pair[i][1]});
+        }
+        for (int i = 0; i < pairs.face_vertex.size; ++i) {
+          body.template operator()<Kind::vertex_face>(chunk, Candidate{pairs.face_vertex.pair[i][1], pairs.face_vertex.pair[i][0]});
+        }
+        for (int i = 0; i < pairs.edge_edge.size; ++i) {
+          body.template operator()<Kind::edge_edge>(chunk, ordered_edges(pairs.edge_edge.pair[i][0], pairs.edge_edge.pair[i][1]));
+        }
       };
       for (int leaf = static_cast<int>(begin); leaf < static_cast<int>(end); ++leaf) {
-        for_each_pair_within(t, boxes, leaf, vertex_face, edge_edge);
-        for_each_leaf(t, boxes, boxes.node[t.leaf_node[leaf]], leaf + 1,
-                      [&](int other) { for_each_pair(t, boxes, leaf, t, boxes, other, vertex_face, face_vertex, edge_edge); });
+        collect_pairs_within(t, boxes, leaf, pairs);
+        work_off();
+        for_each_leaf(t, boxes, boxes.node[t.leaf_node[leaf]], leaf + 1, [&](int other) {
+          collect_pairs<Between::one_surface>(t, boxes, leaf, t, boxes, other, pairs);
+          work_off();
+        });
       }
     });
   }
@@ -154,12 +171,19 @@ struct Search::Impl {
     const Tree& t = cloth_tree;
     parallel_chunks(t.leaf_count(), leaf_grain, [&](std::size_t begin, std::size_t end) {
       Chunk& chunk = chunks[begin / leaf_grain];
-      const auto vertex_face = [&](int v, int f) { body.template operator()<Kind::vertex_support_face>(chunk, Candidate{v, f}); };
-      const auto face_vertex = [&](int f, int v) { body.template operator()<Kind::support_vertex_face>(chunk, Candidate{v, f}); };
-      const auto edge_edge = [&](int e, int f) { body.template operator()<Kind::edge_support_edge>(chunk, Candidate{e, f}); };
+      LeafPairs pairs;
       for (int leaf = static_cast<int>(begin); leaf < static_cast<int>(end); ++leaf) {
         for_each_leaf(support_tree, support_boxes, against_boxes.node[t.leaf_node[leaf]], 0, [&](int other) {
-          for_each_pair(t, against_boxes, leaf, support_tree, support_boxes, other, vertex_face, face_vertex, edge_edge);
+          collect_pairs<Between::two_surfaces>(t, against_boxes, leaf, support_tree, support_boxes, other, pairs);
+          for (int i = 0; i < pairs.vertex_face.size; ++i) {
+            body.template operator()<Kind::vertex_support_face>(chunk, Candidate{pairs.vertex_face.pair[i][0], pairs.vertex_face.pair[i][1]});
+          }
+          for (int i = 0; i < pairs.face_vertex.size; ++i) {
+            body.template operator()<Kind::support_vertex_face>(chunk, Candidate{pairs.face_vertex.pair[i][1], pairs.face_vertex.pair[i][0]});
+          }
+          for (int i = 0; i < pairs.edge_edge.size; ++i) {
+            body.template operator()<Kind::edge_support_edge>(chunk, Candidate{pairs.edge_edge.pair[i][0], pairs.edge_edge.pair[i][1]});
+          }
         });
       }
     });
@@ -170,7 +194,7 @@ struct Search::Impl {
 
   // How much an edge pair counts: 1 where the faces of both edges lean away from the other edge, 0 where one leans towards it.
   template <Kind kind>
-  double edge_share(const Candidate& c, const Nodes& n, const std::array<Vec, 4>& x, const Vec& normal) const {
+  double edge_share(const Candidate& c, const std::array<Vec, 4>& x, const Vec& normal) const {
     const auto lean = [](const Tree& tree, const std::vector<Vec>& at, int edge, const Vec& a, const Vec& b, const Vec& towards) {
       double most = -1;
       const Vec along = b - a;
@@ -184,7 +208,6 @@ struct Search::Impl {
       }
       return most;
     };
-    (void)n;
     const bool second_is_support = kind == Kind::edge_support_edge;
     const Tree& second = second_is_support ? support_tree : cloth_tree;
     const std::vector<Vec>& second_x = second_is_support ? support_at.x : cloth_at.x;
@@ -197,11 +220,16 @@ struct Search::Impl {
   }
 
   template <Kind kind>
-  void test_near(Chunk& chunk, const Candidate& c, double radius_sq) const {
+  void test_near(Chunk& chunk, const Candidate& c, double radius) const {
     const Nodes n = nodes<kind>(c);
     const std::array<Vec, 4> x = gather(n, cloth_at.x, support_at.x);
+    if (surely_apart<type<kind>()>(x, radius)) return;
     const Closest found_at = closest<type<kind>()>(x);
-    if (!(found_at.distance_sq < radius_sq)) return;
+    if (found_at.distance_sq < radius * radius) add_contact<kind>(chunk, c, n, x, found_at);
+  }
+
+  template <Kind kind>
+  void add_contact(Chunk& chunk, const Candidate& c, const Nodes& n, const std::array<Vec, 4>& x, const Closest& found_at) const {
     Contact contact;
     contact.kind = kind;
     contact.weight = found_at.weight;
@@ -213,7 +241,7 @@ struct Search::Impl {
       Vec normal = Vec::Zero();
       for (int k = 0; k < 4; ++k) normal += contact.weight[k] * x[k];
       if (contact.distance > 0) normal /= contact.distance;
-      contact.share = edge_share<kind>(c, n, x, normal);
+      contact.share = edge_share<kind>(c, x, normal);
       if (!(contact.share > 0)) return;
     }
     const Tree& second = kind == Kind::vertex_support_face || kind == Kind::edge_support_edge ? support_tree : cloth_tree;
@@ -236,18 +264,23 @@ struct Search::Impl {
 
   // Orders a kind's contacts by (a, b); of a vertex's faces that hang together keeps the nearest.
   void sort_kind(Kind kind, const Points3& x, const Points3& support_x) {
-    const int k = static_cast<int>(kind);
-    auto& all = found[k];
-    auto& out = sorted[k];
-    all.clear();
-    for (const Chunk& chunk : chunks) all.insert(all.end(), chunk.contacts[k].begin(), chunk.contacts[k].end());
+    KindScratch& work = scratch[static_cast<int>(kind)];
+    auto& out = work.sorted;
+    auto& bucket = work.bucket;
     const Surface& first = kind == Kind::support_vertex_face ? support : cloth;
     const std::size_t keys = is_edge_pair(kind) ? first.edges.size() : static_cast<std::size_t>(first.node_count);
     bucket.assign(keys + 1, 0);
-    for (const Contact& c : all) ++bucket[c.a + 1];
+    std::size_t total = 0;
+    for (const Chunk& chunk : chunks) {
+      for (const Contact& c : chunk.contacts[static_cast<int>(kind)]) ++bucket[c.a + 1];
+      total += chunk.contacts[static_cast<int>(kind)].size();
+    }
+    out.resize(total);
+    if (total == 0) return;
     for (std::size_t i = 0; i < keys; ++i) bucket[i + 1] += bucket[i];
-    out.resize(all.size());
-    for (const Contact& c : all) out[bucket[c.a]++] = c;
+    for (const Chunk& chunk : chunks) {
+      for (const Contact& c : chunk.contacts[static_cast<int>(kind)]) out[bucket[c.a]++] = c;
+    }
     // Now bucket[a] is the end of a's contacts.
     const Surface& second = kind == Kind::vertex_support_face ? support : cloth;
     std::size_t kept_total = 0;
@@ -259,68 +292,190 @@ struct Search::Impl {
         std::sort(at(begin), at(end), [](const Contact& p, const Contact& q) {
           return p.distance != q.distance ? p.distance < q.distance : p.b < q.b;
         });
-        kept_end = keep_nearest_of_patches(second, out, begin, end, x, support_x);
+        kept_end = keep_nearest_of_patches(second, work, begin, end, x, support_x);
       }
-      std::sort(at(begin), at(kept_end), [](const Contact& p, const Contact& q) { return p.b < q.b; });
-      for (std::size_t i = begin; i < kept_end; ++i) out[kept_total++] = out[i];
+      if (kept_end - begin > 1) std::sort(at(begin), at(kept_end), [](const Contact& p, const Contact& q) { return p.b < q.b; });
+      if (kept_total == begin) {
+        kept_total = kept_end;
+      } else {
+        for (std::size_t i = begin; i < kept_end; ++i) out[kept_total++] = out[i];
+      }
       begin = end;
     }
     out.resize(kept_total);
   }
 
-  std::vector<Vec> directions;
-  std::vector<std::array<int, 3>> patch_faces;
-  std::size_t keep_nearest_of_patches(const Surface& second, std::vector<Contact>& list, std::size_t begin, std::size_t end,
-                                      const Points3& x, const Points3& support_x) {
-    directions.clear();
-    patch_faces.clear();
+  std::size_t keep_nearest_of_patches(const Surface& second, KindScratch& work, std::size_t begin, std::size_t end, const Points3& x,
+                                      const Points3& support_x) const {
+    work.directions.clear();
+    work.patch_faces.clear();
     std::size_t kept = begin;
     for (std::size_t i = begin; i < end; ++i) {
-      const Contact c = list[i];
+      const Contact c = work.sorted[i];
       Vec n = gap(c, x, support_x);
       const double size = n.norm();
       if (size > 0) n /= size;
       std::array<int, 3> face{second.faces(c.b, 0), second.faces(c.b, 1), second.faces(c.b, 2)};
       for (int& id : face) id = second.adjacency[id];
       bool nearer_neighbour = false;
-      for (std::size_t j = 0; j < directions.size() && !nearer_neighbour; ++j) {
-        if (!(n.dot(directions[j]) > 0.5) && size > 0) continue;
+      for (std::size_t j = 0; j < work.directions.size() && !nearer_neighbour; ++j) {
+        if (!(n.dot(work.directions[j]) > 0.5) && size > 0) continue;
         for (const int p : face) {
-          for (const int q : patch_faces[j]) nearer_neighbour |= p == q;
+          for (const int q : work.patch_faces[j]) nearer_neighbour |= p == q;
         }
       }
-      directions.push_back(n);
-      patch_faces.push_back(face);
-      if (!nearer_neighbour) list[kept++] = c;
+      work.directions.push_back(n);
+      work.patch_faces.push_back(face);
+      if (!nearer_neighbour) work.sorted[kept++] = c;
     }
     return kept;
   }
 
+  // ---------------------------------------------------------------- lists of near pairs
+
+  // Largest |x - from - shift|.
+  static double farthest(const std::vector<Vec>& x, const std::vector<Vec>& from, const Vec& shift) {
+    const double largest_sq = parallel_reduce(
+        x.size(), 4096, 0.0,
+        [&](std::size_t begin, std::size_t end) {
+          double part = 0;
+          for (std::size_t i = begin; i < end; ++i) part = std::max(part, (x[i] - from[i] - shift).squaredNorm());
+          return part;
+        },
+        [](double p, double q) { return std::max(p, q); });
+    return std::sqrt(largest_sq);
+  }
+  // Half of the largest and smallest displacement per axis: a shift that all nodes have about in common.
+  static Vec common_shift(const std::vector<Vec>& x, const std::vector<Vec>& from) {
+    struct Range {
+      Vec lo = Vec::Constant(INFINITY), hi = Vec::Constant(-INFINITY);
+    };
+    const Range all = parallel_reduce(
+        x.size(), 4096, Range{},
+        [&](std::size_t begin, std::size_t end) {
+          Range r;
+          for (std::size_t i = begin; i < end; ++i) {
+            const Vec d = x[i] - from[i];
+            r.lo = r.lo.cwiseMin(d), r.hi = r.hi.cwiseMax(d);
+          }
+          return r;
+        },
+        [](const Range& p, const Range& q) { return Range{p.lo.cwiseMin(q.lo), p.hi.cwiseMax(q.hi)}; });
+    return x.empty() ? Vec(Vec::Zero()) : Vec(0.5 * (all.lo + all.hi));
+  }
+
+  // Whether every cloth-cloth pair that comes within `radius` at x, at y or anywhere between is in the list: a pair's
+  // distance changes by no more than its two sides move against the common shift.
+  bool self_list_covers(const std::vector<Vec>& x, const std::vector<Vec>& y, double radius) const {
+    if (!near_self.valid || near_self.reference.size() != x.size()) return false;
+    const Vec shift = common_shift(x, near_self.reference);
+    double way = farthest(x, near_self.reference, shift);
+    if (&y != &x) way = std::max(way, farthest(y, near_self.reference, shift));
+    return near_self.reach - 2 * way > radius * (1 + 1e-9);
+  }
+  bool support_list_covers(const std::vector<Vec>& x, const std::vector<Vec>& y, const std::vector<Vec>& s, const std::vector<Vec>& t,
+                           double radius) const {
+    const NearList& list = near_support;
+    if (!list.valid || list.reference.size() != x.size()) return false;
+    double way = farthest(x, list.reference, Vec::Zero()), support_way = farthest(s, list.support_reference, Vec::Zero());
+    if (&y != &x) {
+      way = std::max(way, farthest(y, list.reference, Vec::Zero()));
+      support_way = std::max(support_way, farthest(t, list.support_reference, Vec::Zero()));
+    }
+    return list.reach - way - support_way > radius * (1 + 1e-9);
+  }
+
+  // A list pays when things move so slowly that the next call will find it valid.
+  template <Kind kind>
+  void test_and_list(NearList& list, Chunk& chunk, const Candidate& c, double radius) const {
+    const Nodes n = nodes<kind>(c);
+    const std::array<Vec, 4> x = gather(n, cloth_at.x, support_at.x);
+    if (surely_apart<type<kind>()>(x, list.reach)) return;
+    const Closest found_at = closest<type<kind>()>(x);
+    if (!(found_at.distance_sq < list.reach * list.reach)) return;
+    list.chunks[&chunk - chunks.data()][static_cast<int>(kind)].push_back(c);
+    if (found_at.distance_sq < radius * radius) add_contact<kind>(chunk, c, n, x, found_at);
+  }
+  void start_list(NearList& list, double radius) {
+    list.valid = true;
+    list.reach = radius + slack;
+    list.reference = cloth_at.x;
+    list.chunks.resize(chunks.size());
+    for (auto& kinds : list.chunks) {
+      for (auto& part : kinds) part.clear();
+    }
+  }
+  template <class Body>
+  void for_list(const NearList& list, const Body& body) {
+    parallel_for(chunks.size(), 1, [&](std::size_t i) {
+      const auto run = [&]<Kind kind>() {
+        for (const Candidate& c : list.chunks[i][static_cast<int>(kind)]) body.template operator()<kind>(chunks[i], c);
+      };
+      run.template operator()<Kind::vertex_face>();
+      run.template operator()<Kind::edge_edge>();
+      run.template operator()<Kind::vertex_support_face>();
+      run.template operator()<Kind::support_vertex_face>();
+      run.template operator()<Kind::edge_support_edge>();
+    });
+  }
+
+  void find_near_self(double radius) {
+    const std::vector<Vec>& x = cloth_at.x;
+    const bool covered = self_list_covers(x, x, radius);
+    const bool slow = near_self.previous.size() != x.size() || 2 * farthest(x, near_self.previous, common_shift(x, near_self.previous)) < slack;
+    near_self.previous = x;
+    if (covered) {
+      for_list(near_self, [&]<Kind kind>(Chunk& chunk, const Candidate& c) { test_near<kind>(chunk, c, radius); });
+    } else if (slow) {
+      start_list(near_self, radius);
+      self_boxes.refit(cloth_tree, x, x, 0.5 * near_self.reach);
+      self_pairs([&]<Kind kind>(Chunk& chunk, const Candidate& c) { test_and_list<kind>(near_self, chunk, c, radius); });
+    } else {
+      self_boxes.refit(cloth_tree, x, x, 0.5 * radius);
+      self_pairs([&]<Kind kind>(Chunk& chunk, const Candidate& c) { test_near<kind>(chunk, c, radius); });
+    }
+  }
+  void find_near_support(const Points3& support_x, double radius) {
+    const std::vector<Vec>& x = cloth_at.x;
+    support_at.load(support_tree, support_x);
+    const std::vector<Vec>& s = support_at.x;
+    NearList& list = near_support;
+    const bool covered = support_list_covers(x, x, s, s, radius);
+    const bool slow = list.previous.size() != x.size() ||
+                      farthest(x, list.previous, Vec::Zero()) + farthest(s, list.support_previous, Vec::Zero()) < slack;
+    list.previous = x;
+    list.support_previous = s;
+    if (covered) {
+      for_list(list, [&]<Kind kind>(Chunk& chunk, const Candidate& c) { test_near<kind>(chunk, c, radius); });
+      return;
+    }
+    load_support(support_x, support_x);
+    if (slow) {
+      start_list(list, radius);
+      list.support_reference = s;
+      against_boxes.refit(cloth_tree, x, x, list.reach);
+      support_pairs([&]<Kind kind>(Chunk& chunk, const Candidate& c) { test_and_list<kind>(list, chunk, c, radius); });
+    } else {
+      against_boxes.refit(cloth_tree, x, x, radius);
+      support_pairs([&]<Kind kind>(Chunk& chunk, const Candidate& c) { test_near<kind>(chunk, c, radius); });
+    }
+  }
+
   Contacts proximity(const Points3& x, const Points3& support_x, Radii radii) {
     TOILE_CHECK(x.rows() == cloth.node_count, "positions {} nodes {}", x.rows(), cloth.node_count);
+    TOILE_CHECK(!has_support || support_x.rows() == support.node_count, "support positions {} nodes {}", support_x.rows(), support.node_count);
     size_chunks();
     for (Chunk& chunk : chunks) chunk.clear_contacts();
     cloth_at.load(cloth_tree, x);
-    if (radii.self > 0) {
-      self_boxes.refit(cloth_tree, cloth_at.x, cloth_at.x, 0.5 * radii.self);
-      const double radius_sq = radii.self * radii.self;
-      self_pairs([&]<Kind kind>(Chunk& chunk, const Candidate& c) { test_near<kind>(chunk, c, radius_sq); });
-    }
-    if (has_support && radii.support > 0) {
-      load_support(support_x, support_x);
-      support_at.load(support_tree, support_x);
-      against_boxes.refit(cloth_tree, cloth_at.x, cloth_at.x, radii.support);
-      const double radius_sq = radii.support * radii.support;
-      support_pairs([&]<Kind kind>(Chunk& chunk, const Candidate& c) { test_near<kind>(chunk, c, radius_sq); });
-    }
-    self_contacts.clear();
-    support_contacts.clear();
-    for (const Kind kind : all_kinds) {
-      sort_kind(kind, x, support_x);
-      auto& to = is_support(kind) ? support_contacts : self_contacts;
-      const auto& from = sorted[static_cast<int>(kind)];
-      to.insert(to.end(), from.begin(), from.end());
-    }
+    if (radii.self > 0) find_near_self(radii.self);
+    if (has_support && radii.support > 0) find_near_support(support_x, radii.support);
+    parallel_for(5, 1, [&](std::size_t k) { sort_kind(all_kinds[k], x, support_x); });
+    const auto join = [&](std::vector<Contact>& to, std::initializer_list<Kind> kinds) {
+      to.clear();
+      for (const Kind kind : kinds) to.insert(to.end(), scratch[static_cast<int>(kind)].sorted.begin(), scratch[static_cast<int>(kind)].sorted.end());
+    };
+    join(self_contacts, {Kind::vertex_face, Kind::edge_edge});
+    join(support_contacts, {Kind::vertex_support_face, Kind::support_vertex_face, Kind::edge_support_edge});
     return {self_contacts, support_contacts};
   }
 
@@ -338,7 +493,7 @@ struct Search::Impl {
 
   // ---------------------------------------------------------------- steps
 
-  // Loads a step and collects the candidates: pairs whose swept boxes come within the separation.
+  // Loads a step and collects the candidates: pairs whose swept boxes come within the separation, and their impacts.
   void prepare_step(const Points3& x0, const Points3& x1, const LimitOptions& o) {
     TOILE_CHECK(x0.rows() == cloth.node_count && x1.rows() == cloth.node_count, "positions {} {} nodes {}", x0.rows(), x1.rows(),
                 cloth.node_count);
@@ -373,9 +528,16 @@ struct Search::Impl {
     TOILE_CHECK(std::isfinite(sum), "displacements are not finite, sum of squares {}", sum);
     // The boxes hold the whole ways at any fraction, so the candidates stay complete however nodes are rewound. Growth by
     // 1.1 separations would do (nearer is an impact); the rest covers rounding.
-    self_boxes.refit(cloth_tree, cloth_from.x, cloth_to.x, 0.6 * o.self_separation);
-    self_pairs([&]<Kind kind>(Chunk& chunk, const Candidate& c) { add_candidate<kind>(chunk, c, o.self_separation); });
-    if (has_support) {
+    if (self_list_covers(cloth_from.x, cloth_to.x, 1.2 * o.self_separation)) {
+      for_list(near_self, [&]<Kind kind>(Chunk& chunk, const Candidate& c) { add_candidate<kind>(chunk, c, o.self_separation); });
+    } else {
+      self_boxes.refit(cloth_tree, cloth_from.x, cloth_to.x, 0.6 * o.self_separation);
+      self_pairs([&]<Kind kind>(Chunk& chunk, const Candidate& c) { add_candidate<kind>(chunk, c, o.self_separation); });
+    }
+    if (!has_support) return;
+    if (support_list_covers(cloth_from.x, cloth_to.x, support_from.x, support_to.x, 1.2 * o.support_separation)) {
+      for_list(near_support, [&]<Kind kind>(Chunk& chunk, const Candidate& c) { add_candidate<kind>(chunk, c, o.support_separation); });
+    } else {
       against_boxes.refit(cloth_tree, cloth_from.x, cloth_to.x, 1.2 * o.support_separation);
       support_pairs([&]<Kind kind>(Chunk& chunk, const Candidate& c) { add_candidate<kind>(chunk, c, o.support_separation); });
     }
@@ -397,19 +559,22 @@ struct Search::Impl {
     }
   }
 
-  // Pairs that stay apart whatever fraction of their displacement the nodes keep are dropped here.
+  // Keeps a pair unless it is safe whatever fraction of their displacement its nodes keep, and looks for its impact.
   template <Kind kind>
   void add_candidate(Chunk& chunk, const Candidate& c, double separation) const {
     const Nodes n = nodes<kind>(c);
     const std::array<Vec, 4> u = gather(n, cloth_u, support_u);
     double first = 0, second = 0;
-    for (int k = 0; k < 4; ++k) (k < first_count(kind) ? first : second) = std::max(k < first_count(kind) ? first : second, u[k].squaredNorm());
+    for (int k = 0; k < first_count(kind); ++k) first = std::max(first, u[k].squaredNorm());
+    for (int k = first_count(kind); k < 4; ++k) second = std::max(second, u[k].squaredNorm());
     const double way = std::sqrt(first) + std::sqrt(second);
     if (way == 0) return;
-    const double distance = std::sqrt(closest<type<kind>()>(gather(n, cloth_from.x, support_from.x)).distance_sq);
-    if (distance - way >= separation_floor(distance, separation)) return;
-    if (exempt<kind>(n)) return;
-    chunk.candidates[static_cast<int>(kind)].push_back(c);
+    const std::array<Vec, 4> x = gather(n, cloth_from.x, support_from.x);
+    if (surely_apart<type<kind>()>(x, way + separation) || exempt<kind>(n)) return;
+    auto& list = chunk.candidates[static_cast<int>(kind)];
+    const Approach a = approach<type<kind>()>(x, u, separation);
+    if (a.impact) chunk.impacts[static_cast<int>(kind)].push_back({static_cast<int>(list.size()), a.time, a.touching});
+    list.push_back(c);
   }
 
   // Calls body.template operator()<kind>(chunk, index, candidate) for all candidates, chunks in parallel.
@@ -431,21 +596,22 @@ struct Search::Impl {
 
   static double separation_of(Kind kind, const LimitOptions& o) { return is_support(kind) ? o.support_separation : o.self_separation; }
 
-  // Finds impacts among the candidates; of all pairs, or of those with a changed node. Returns their number.
-  int find_impacts(const LimitOptions& o, bool all) {
+  // Finds impacts among the candidates that have a changed node.
+  void find_impacts(const LimitOptions& o) {
+    for (Chunk& chunk : chunks) {
+      for (auto& list : chunk.impacts) list.clear();
+    }
     for_candidates([&]<Kind kind>(Chunk& chunk, int index, const Candidate& c) {
-      auto& list = chunk.impacts[static_cast<int>(kind)];
-      if (index == 0) list.clear();
       const Nodes n = nodes<kind>(c);
-      if (!all) {
-        bool touched = is_support(kind) && support_changed;
-        for (int k = 0; k < 4; ++k) touched |= !n.of_support[k] && changed[n.id[k]];
-        if (!touched) return;
-      }
+      bool touched = is_support(kind) && support_changed;
+      for (int k = 0; k < 4; ++k) touched |= !n.of_support[k] && changed[n.id[k]];
+      if (!touched) return;
       const Approach a =
           approach<type<kind>()>(gather(n, cloth_from.x, support_from.x), gather(n, cloth_u, support_u), separation_of(kind, o));
-      if (a.impact) list.push_back({index, a.time, a.touching});
+      if (a.impact) chunk.impacts[static_cast<int>(kind)].push_back({index, a.time, a.touching});
     });
+  }
+  int count_impacts() const {
     int count = 0;
     for (const Chunk& chunk : chunks) {
       for (const auto& list : chunk.impacts) count += static_cast<int>(list.size());
@@ -518,7 +684,8 @@ struct Search::Impl {
     limit.limited_pairs = limit.limited_nodes = limit.rounds = limit.fallback_pairs = limit.touching_pairs = 0;
 
     for (int round = 0;; ++round) {
-      const int impacts = find_impacts(o, round == 0);
+      if (round > 0) find_impacts(o);
+      const int impacts = count_impacts();
       if (round == 0) {
         limit.limited_pairs = impacts;
         for (const Chunk& chunk : chunks) {
@@ -565,7 +732,6 @@ struct Search::Impl {
   double step_fraction(const Points3& x0, const Points3& x1, const Points3& s0, const Points3& s1, const LimitOptions& o) {
     load_support_step(s0, s1);
     prepare_step(x0, x1, o);
-    find_impacts(o, true);
     double least = 1;
     for (const Chunk& chunk : chunks) {
       for (const auto& list : chunk.impacts) {
@@ -579,6 +745,9 @@ struct Search::Impl {
 Search::Search(Surface cloth, const Points3& x) : impl_(std::make_unique<Impl>()) {
   TOILE_CHECK(x.rows() == cloth.node_count, "positions {} nodes {}", x.rows(), cloth.node_count);
   impl_->cloth_tree = Tree(cloth, x);
+  double edges = 0;
+  for (const auto& [a, b] : cloth.edges) edges += (x.row(a) - x.row(b)).norm();
+  impl_->slack = cloth.edges.empty() ? 0 : 0.2 * edges / static_cast<double>(cloth.edges.size());
   impl_->cloth = std::move(cloth);
 }
 

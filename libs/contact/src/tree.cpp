@@ -97,6 +97,8 @@ Tree::Tree(const Surface& surface, const Points3& x) {
     edge_third.push_back(third);
   }
   for (const int v : vertex_id) adjacency.push_back(surface.adjacency[v]);
+  for (const auto& e : edge) edge_adjacency.push_back({adjacency[e[0]], adjacency[e[1]]});
+  for (const auto& f : face) face_adjacency.push_back({adjacency[f[0]], adjacency[f[1]], adjacency[f[2]]});
 }
 
 void Boxes::refit(const Tree& tree, const std::vector<Vec>& x0, const std::vector<Vec>& x1, double grow) {

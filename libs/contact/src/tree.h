@@ -71,7 +71,9 @@ struct Tree {
   std::vector<std::array<int, 2>> edge;          ///< local vertices, in the order of the surface's edge
   std::vector<std::array<int, 3>> face;          ///< local vertices, in the order of the surface's face
   std::vector<std::array<int, 2>> edge_third;    ///< local third corners of an edge's faces, -1 where there is none
-  std::vector<int> adjacency;                    ///< of local vertices
+  std::vector<int> adjacency;                    ///< id of local vertices; primitives that share one are neighbours
+  std::vector<std::array<int, 2>> edge_adjacency;
+  std::vector<std::array<int, 3>> face_adjacency;
   std::vector<int> leaf_vertex, leaf_edge, leaf_face;  ///< first owned primitive of each leaf, and an end mark
 
   struct Node {
@@ -83,7 +85,7 @@ struct Tree {
 };
 
 /// Most faces of a leaf, and so a bound for what it owns.
-constexpr int leaf_faces = 4;
+constexpr int leaf_faces = 6;
 
 /// Boxes of everything in a tree for one state or motion.
 struct Boxes {
@@ -113,60 +115,102 @@ void for_each_leaf(const Tree& tree, const Boxes& boxes, const Box& box, int fir
   }
 }
 
+/// Pairs of local primitive ids, filled without branches: whether two boxes overlap is hard to foretell for a processor.
+template <int capacity>
+struct PairList {
+  std::array<int, 2> pair[capacity + 1];
+  int size = 0;
+  void add_if(bool condition, int a, int b) {
+    pair[size] = {a, b};
+    size += condition;
+  }
+};
+
+/// Most vertices or edges that a leaf owns.
+constexpr int leaf_primitives = 3 * leaf_faces;
+
+/// Pairs of primitives with overlapping boxes of two leaves; neighbours are left out.
+struct LeafPairs {
+  PairList<leaf_primitives * leaf_faces> vertex_face;  ///< vertex of the first leaf, face of the second
+  PairList<leaf_primitives * leaf_faces> face_vertex;  ///< face of the first, vertex of the second
+  PairList<leaf_primitives * leaf_primitives> edge_edge;
+};
+
 /// Owned primitives of a leaf whose boxes reach into `box`.
 struct Reaching {
-  int vertex[3 * leaf_faces], edge[3 * leaf_faces], face[leaf_faces];
+  int vertex[leaf_primitives + 1], edge[leaf_primitives + 1], face[leaf_faces + 1];
   int vertices = 0, edges = 0, faces = 0;
+  Reaching(const Tree& tree, const Boxes& boxes, int leaf, const Box& box) {
+    for (int i = tree.leaf_vertex[leaf]; i < tree.leaf_vertex[leaf + 1]; ++i) {
+      vertex[vertices] = i;
+      vertices += overlap(boxes.vertex[i], box);
+    }
+    for (int i = tree.leaf_edge[leaf]; i < tree.leaf_edge[leaf + 1]; ++i) {
+      edge[edges] = i;
+      edges += overlap(boxes.edge[i], box);
+    }
+    for (int i = tree.leaf_face[leaf]; i < tree.leaf_face[leaf + 1]; ++i) {
+      face[faces] = i;
+      faces += overlap(boxes.face[i], box);
+    }
+  }
 };
-inline Reaching reaching(const Tree& tree, const Boxes& boxes, int leaf, const Box& box) {
-  Reaching r;
-  for (int i = tree.leaf_vertex[leaf]; i < tree.leaf_vertex[leaf + 1]; ++i) {
-    if (overlap(boxes.vertex[i], box)) r.vertex[r.vertices++] = i;
-  }
-  for (int i = tree.leaf_edge[leaf]; i < tree.leaf_edge[leaf + 1]; ++i) {
-    if (overlap(boxes.edge[i], box)) r.edge[r.edges++] = i;
-  }
-  for (int i = tree.leaf_face[leaf]; i < tree.leaf_face[leaf + 1]; ++i) {
-    if (overlap(boxes.face[i], box)) r.face[r.faces++] = i;
-  }
-  return r;
+
+/// Local ids of primitives, as adjacency ids.
+inline bool neighbours(int vertex, const std::array<int, 3>& face) { return (vertex == face[0]) | (vertex == face[1]) | (vertex == face[2]); }
+inline bool neighbours(const std::array<int, 2>& e, const std::array<int, 2>& f) {
+  return (e[0] == f[0]) | (e[0] == f[1]) | (e[1] == f[0]) | (e[1] == f[1]);
 }
 
-/// Pairs of primitives with overlapping boxes between leaf `a` of one tree and `b` of another (or the same):
-/// vertex_face(vertex of a, face of b), face_vertex(face of a, vertex of b), edge_edge(edge of a, edge of b).
-template <class VertexFace, class FaceVertex, class EdgeEdge>
-void for_each_pair(const Tree& ta, const Boxes& ba, int a, const Tree& tb, const Boxes& bb, int b, const VertexFace& vertex_face,
-                   const FaceVertex& face_vertex, const EdgeEdge& edge_edge) {
+enum class Between { one_surface, two_surfaces };
+
+/// Fills `out` with the pairs of leaf `a` of one tree and leaf `b` of another (or another leaf of the same).
+template <Between between>
+void collect_pairs(const Tree& ta, const Boxes& ba, int a, const Tree& tb, const Boxes& bb, int b, LeafPairs& out) {
+  out.vertex_face.size = out.face_vertex.size = out.edge_edge.size = 0;
   const Box both = common(ba.node[ta.leaf_node[a]], bb.node[tb.leaf_node[b]]);
-  const Reaching ra = reaching(ta, ba, a, both), rb = reaching(tb, bb, b, both);
+  const Reaching ra(ta, ba, a, both), rb(tb, bb, b, both);
+  constexpr bool one = between == Between::one_surface;
   for (int i = 0; i < ra.vertices; ++i) {
+    const int v = ra.vertex[i];
     for (int j = 0; j < rb.faces; ++j) {
-      if (overlap(ba.vertex[ra.vertex[i]], bb.face[rb.face[j]])) vertex_face(ra.vertex[i], rb.face[j]);
+      const int f = rb.face[j];
+      bool hit = overlap(ba.vertex[v], bb.face[f]);
+      if constexpr (one) hit &= !neighbours(ta.adjacency[v], tb.face_adjacency[f]);
+      out.vertex_face.add_if(hit, v, f);
     }
   }
   for (int i = 0; i < ra.faces; ++i) {
+    const int f = ra.face[i];
     for (int j = 0; j < rb.vertices; ++j) {
-      if (overlap(ba.face[ra.face[i]], bb.vertex[rb.vertex[j]])) face_vertex(ra.face[i], rb.vertex[j]);
+      const int v = rb.vertex[j];
+      bool hit = overlap(ba.face[f], bb.vertex[v]);
+      if constexpr (one) hit &= !neighbours(tb.adjacency[v], ta.face_adjacency[f]);
+      out.face_vertex.add_if(hit, f, v);
     }
   }
   for (int i = 0; i < ra.edges; ++i) {
+    const int e = ra.edge[i];
     for (int j = 0; j < rb.edges; ++j) {
-      if (overlap(ba.edge[ra.edge[i]], bb.edge[rb.edge[j]])) edge_edge(ra.edge[i], rb.edge[j]);
+      const int f = rb.edge[j];
+      bool hit = overlap(ba.edge[e], bb.edge[f]);
+      if constexpr (one) hit &= !neighbours(ta.edge_adjacency[e], tb.edge_adjacency[f]);
+      out.edge_edge.add_if(hit, e, f);
     }
   }
 }
 
 /// The same within one leaf; every unordered pair once.
-template <class VertexFace, class EdgeEdge>
-void for_each_pair_within(const Tree& tree, const Boxes& boxes, int leaf, const VertexFace& vertex_face, const EdgeEdge& edge_edge) {
-  for (int i = tree.leaf_vertex[leaf]; i < tree.leaf_vertex[leaf + 1]; ++i) {
-    for (int j = tree.leaf_face[leaf]; j < tree.leaf_face[leaf + 1]; ++j) {
-      if (overlap(boxes.vertex[i], boxes.face[j])) vertex_face(i, j);
+inline void collect_pairs_within(const Tree& tree, const Boxes& boxes, int leaf, LeafPairs& out) {
+  out.vertex_face.size = out.face_vertex.size = out.edge_edge.size = 0;
+  for (int v = tree.leaf_vertex[leaf]; v < tree.leaf_vertex[leaf + 1]; ++v) {
+    for (int f = tree.leaf_face[leaf]; f < tree.leaf_face[leaf + 1]; ++f) {
+      out.vertex_face.add_if(overlap(boxes.vertex[v], boxes.face[f]) & !neighbours(tree.adjacency[v], tree.face_adjacency[f]), v, f);
     }
   }
-  for (int i = tree.leaf_edge[leaf]; i < tree.leaf_edge[leaf + 1]; ++i) {
-    for (int j = i + 1; j < tree.leaf_edge[leaf + 1]; ++j) {
-      if (overlap(boxes.edge[i], boxes.edge[j])) edge_edge(i, j);
+  for (int e = tree.leaf_edge[leaf]; e < tree.leaf_edge[leaf + 1]; ++e) {
+    for (int f = e + 1; f < tree.leaf_edge[leaf + 1]; ++f) {
+      out.edge_edge.add_if(overlap(boxes.edge[e], boxes.edge[f]) & !neighbours(tree.edge_adjacency[e], tree.edge_adjacency[f]), e, f);
     }
   }
 }

@@ -125,6 +125,21 @@ inline Closest closest(const std::array<Vec, 4>& x) {
   }
 }
 
+/// Whether the slab across the line of centres proves that two primitives are farther apart than `distance`; cheap, and
+/// false says nothing.
+template <PairType type>
+inline bool surely_apart(const std::array<Vec, 4>& x, double distance) {
+  if constexpr (type == PairType::vertex_face) {
+    const Vec a = x[1] - x[0], b = x[2] - x[0], c = x[3] - x[0], m = a + b + c;
+    const double gap = std::min({m.dot(a), m.dot(b), m.dot(c)});
+    return gap > 0 && gap * gap > distance * distance * m.squaredNorm();
+  } else {
+    const Vec d1 = x[1] - x[0], d2 = x[3] - x[2], m = (x[2] + x[3]) - (x[0] + x[1]);
+    const double gap = 0.5 * m.squaredNorm() - 0.5 * (std::abs(m.dot(d1)) + std::abs(m.dot(d2)));
+    return gap > 0 && gap * gap > distance * distance * m.squaredNorm();
+  }
+}
+
 /// Smallest distance that a pair may come to when it starts at `distance`: `separation`; half of what there is when it
 /// starts within twice that; and from a fiftieth of the separation on nothing but the last 1e-12 m, so that no number of
 /// steps wears the distance down to rounding.
@@ -145,7 +160,7 @@ struct Approach {
 /// separation_floor(distance(x), separation). Advances by the larger of two safe steps: gap over relative speed with the
 /// mean motion taken out (additive advancement, Li et al. 2021) and the time until the slab between the closest points,
 /// normal to their connection, is used up. A motion that never comes nearer than 1.1
-/// times the floor has no impact, unless it takes more than 200 steps to see that.
+/// times the floor has no impact, unless it takes more than 20000 steps to see that.
 /// x, u    positions [m] and displacements [m]
 /// Source: docs/bibliography.md#li2021
 template <PairType type>
@@ -157,19 +172,18 @@ Approach approach(const std::array<Vec, 4>& x, const std::array<Vec, 4>& u, doub
     for (int k = first; k < 4; ++k) b = std::max(b, (u[k] - mean).squaredNorm());
     return std::sqrt(a) + std::sqrt(b);
   };
+  const double speed = std::min(speed_bound(Vec::Zero()), speed_bound(0.25 * (u[0] + u[1] + u[2] + u[3])));
+  if (speed == 0 || surely_apart<type>(x, speed + separation)) return {};
   Closest now = closest<type>(x);
   double distance = std::sqrt(now.distance_sq);
   const double floor = separation_floor(distance, separation);
-  const double plain_speed = speed_bound(Vec::Zero());
-  if (distance - plain_speed >= floor) return {};
-  const double speed = std::min(plain_speed, speed_bound(0.25 * (u[0] + u[1] + u[2] + u[3])));
   if (distance - speed >= floor) return {};
-  if (distance < touching_distance) return {speed > 0 ? 0.0 : 1.0, speed > 0, true};
+  if (distance < touching_distance) return {0, true, true};
   const double target = 0.1 * std::min(floor, distance - floor);  // gap above the floor that counts as an impact
   const double aim = floor + 0.5 * target;                        // never step nearer than this
   double time = 0;
   std::array<Vec, 4> y = x;
-  for (int step = 0; step < 200; ++step) {
+  for (int step = 0; step < 20000; ++step) {
     double advance = (distance - aim) / speed;
     // Along the connection's direction every node moves uniformly, so the slab lasts until the first of its pairs of
     // nodes has used it up.
