@@ -18,7 +18,7 @@ struct SewStage {
             .details = "A side of a seam is a chain of edges, panel.edge, in sewing order; '-' before an edge runs it backwards. Edges run "
                        "counter-clockwise round their panel, so one side of a seam between two panels is always run backwards. Sides are matched "
                        "by relative arc length; the side with fewer particles gets more. Lengths that differ by more than the tolerance need a "
-                       "declared `ease`. Exit code 4 if lengths differ, a seam is twisted, pinches the cloth or closes a triangle to nothing. "
+                       "declared `ease`. Exit code 4 if lengths differ, a seam is twisted, folds a panel onto itself or closes a triangle to nothing. "
                        "docs/tailoring.md says how it is done.",
             .inputs = {{.name = "garment", .doc = "flat panels from toile-mesh", .kind = stage::FileKind::garment}},
             .output = stage::FileKind::garment};
@@ -34,6 +34,7 @@ struct SewStage {
     run.report("components", surface.components);
     run.report("openings", surface.openings);
     run.report("euler", surface.euler);
+    run.report("branching_edges", surface.branching_edges);
     std::string lengths;
     for (double length : surface.opening_lengths) lengths += fmt::format("{}{:.1f}", lengths.empty() ? "" : " ", length * 1e3);
     run.report("opening_lengths_mm", lengths);

@@ -66,7 +66,13 @@ SurfaceReport surface_report(const mesh::GarmentMesh& garment) {
   const std::vector<std::uint64_t> keys = sorted_edges(faces);
   std::size_t edges = 0;
   std::vector<char> used(static_cast<std::size_t>(report.particles), 0);
-  for (std::size_t i = 0; i < keys.size(); ++i) edges += i == 0 || keys[i] != keys[i - 1];
+  for (std::size_t i = 0; i < keys.size();) {
+    std::size_t j = i;
+    while (j < keys.size() && keys[j] == keys[i]) ++j;
+    ++edges;
+    report.branching_edges += j - i > 2;
+    i = j;
+  }
   for (Eigen::Index i = 0; i < faces.size(); ++i) used[faces.data()[i]] = 1;
   report.euler = static_cast<int>(std::count(used.begin(), used.end(), 1)) - static_cast<int>(edges) + static_cast<int>(faces.rows());
   // Border edges, walked with the surface on the left.

@@ -61,6 +61,7 @@ class Table {
     for (Eigen::Index f = 0; f < garment.face_count(); ++f) mesh_.triangles[static_cast<std::size_t>(f)] = {garment.faces(f, 0), garment.faces(f, 1), garment.faces(f, 2)};
     build_stars(mesh_);
     rows_.resize(garment.runs.size());
+    sewn_by_.resize(garment.runs.size());
     for (const auto& row : garment.run_vertices) rows_[static_cast<std::size_t>(row.run)].emplace_back(row.s, row.vertex);
     std::vector<int> uses(mesh_.vertices.size(), 0);
     for (std::size_t r = 0; r < rows_.size(); ++r) {
@@ -147,6 +148,11 @@ class Table {
     return 0;
   }
   void hold(int vertex) { held_[vertex] = 1; }
+  /// Seam that has sewn a run already, if any.
+  const std::string* sewn_by(int run) const { return sewn_by_[run].empty() ? nullptr : &sewn_by_[run]; }
+  void set_sewn(int run, const std::string& seam) {
+    if (sewn_by_[run].empty()) sewn_by_[run] = seam;
+  }
 
   /// New vertex between two neighbours of a run, for now halfway between them; slide() gives it its place.
   int insert(int run, int a, int b) {
@@ -182,6 +188,22 @@ class Table {
       improve(mesh_, options);
     }
     ways_.clear();
+    // Vertices that improve() put in belong to the panel of those around them.
+    std::vector<int> waiting;
+    for (std::size_t v = panel_.size(); v < mesh_.vertices.size(); ++v) waiting.push_back(static_cast<int>(v));
+    panel_.resize(mesh_.vertices.size(), -1);
+    held_.resize(mesh_.vertices.size(), 0);
+    while (!waiting.empty()) {
+      std::vector<int> later;
+      for (int v : waiting) {
+        for (int t : mesh_.stars[v]) {
+          for (int w : mesh_.triangles[t]) panel_[v] = std::max(panel_[v], panel_[w]);
+        }
+        if (panel_[v] < 0 && !mesh_.stars[v].empty()) later.push_back(v);
+      }
+      TOILE_CHECK(later.size() < waiting.size(), "{} vertices belong to no panel", later.size());
+      waiting = std::move(later);
+    }
   }
 
   bool has_turned_over(int& vertex) const {
@@ -209,6 +231,7 @@ class Table {
   std::vector<char> held_;
   std::vector<std::vector<std::pair<double, int>>> rows_;  ///< arc length and vertex, per run
   std::vector<RunCurve> curves_;
+  std::vector<std::string> sewn_by_;
   std::vector<Way> ways_;
 };
 
@@ -346,7 +369,7 @@ Issues check_seams(const GarmentMesh& garment, const Table& table, const std::ve
 }
 
 /// For each of the n coarse places one of the m >= n fine ones, ascending, ends on ends, with the least sum of squared
-/// distances. Source: docs/tailoring.md, "Pairs"
+/// distances; of equally good ones the first. Source: docs/tailoring.md, "Pairs"
 std::vector<int> best_pairs(const std::vector<double>& coarse, const std::vector<double>& fine) {
   const int n = static_cast<int>(coarse.size()), m = static_cast<int>(fine.size()), slack = m - n;
   constexpr double never = std::numeric_limits<double>::infinity();
@@ -358,7 +381,7 @@ std::vector<int> best_pairs(const std::vector<double>& coarse, const std::vector
     double best = never;
     int best_d = 0;
     for (int d = 0; d <= slack; ++d) {
-      if (cost[i - 1][d] < best) best = cost[i - 1][d], best_d = d;
+      if (cost[i - 1][d] < best - 1e-12) best = cost[i - 1][d], best_d = d;
       const double off = coarse[i] - fine[i + d];
       cost[i][d] = best + off * off;
       from[i][d] = best_d;
@@ -502,6 +525,11 @@ Result<std::vector<std::array<int, 2>>> join(Table& table, const GarmentMesh& ga
       const auto& rows = table.rows()[static_cast<std::size_t>(after.run)];
       const auto in_run = [&](int v) { return std::any_of(rows.begin(), rows.end(), [&](const auto& row) { return row.second == v; }); };
       TOILE_CHECK(in_run(before_vertex) && in_run(after_vertex), "vertices {} and {} are not both of run {}", before_vertex, after_vertex, after.run);
+      if (const std::string* other = table.sewn_by(after.run)) {
+        const auto& run = garment.runs[static_cast<std::size_t>(after.run)];
+        return seam_issue(spec, "seam_conflict", fmt::format("edge {}.{} is sewn in seam {} already and would need more particles", garment.panels[static_cast<std::size_t>(run.panel)].name, run.name, *other),
+                          "give the panels that share this edge cells of the same size");
+      }
       const int v = table.insert(after.run, before_vertex, after_vertex);
       table.slide(after.run, v, part->reversed ? run_length - (s - run_start) : s - run_start);
       joined[p][side] = {v};
@@ -518,6 +546,9 @@ Result<std::vector<std::array<int, 2>>> join(Table& table, const GarmentMesh& ga
     for (const auto& side : place) {
       for (int v : side) table.hold(v);
     }
+  }
+  for (const auto& side : seam.sides) {
+    for (const ChainRun& part : side) table.set_sewn(part.run, spec.name);
   }
   report.length_a = length[0];
   report.length_b = length[1];
@@ -538,7 +569,6 @@ Issues check_surface(const GarmentMesh& garment) {
   }
   const auto item = [&](int id) { return "seam " + seam_of[id]; };
   std::map<std::array<int, 3>, Eigen::Index> seen;
-  std::map<int, std::vector<std::pair<int, int>>> links;
   constexpr std::size_t enough = 20;
   for (Eigen::Index f = 0; f < faces.rows() && issues.size() < enough; ++f) {
     std::array<int, 3> v{faces(f, 0), faces(f, 1), faces(f, 2)};
@@ -552,41 +582,10 @@ Issues check_surface(const GarmentMesh& garment) {
       break;
     }
     if (flat) continue;
-    for (int k = 0; k < 3; ++k) {
-      if (welded[v[k]]) links[v[k]].emplace_back(v[(k + 1) % 3], v[(k + 2) % 3]);
-    }
     const int any = welded[v[0]] ? v[0] : welded[v[1]] ? v[1] : v[2];
     std::sort(v.begin(), v.end());
     const auto [twin, fresh] = seen.emplace(v, f);
     if (!fresh) issues.push_back({"folded_panel", {.item = item(any)}, fmt::format("it lays a triangle of panel {} onto one of panel {}", place_text(garment, place), place_text(garment, garment.faces(twin->second, 0))), "check the edges of the seam, or use smaller cells there", Category::check});
-  }
-  if (!issues.empty()) return issues;
-  for (const auto& [id, link] : links) {
-    // Pieces of the ring of faces around the particle.
-    std::map<int, int> root;
-    std::map<int, int> degree;
-    const auto find = [&](int a) {
-      while (root[a] != a) a = root[a];
-      return a;
-    };
-    for (const auto& [a, b] : link) {
-      root.emplace(a, a);
-      root.emplace(b, b);
-      ++degree[a];
-      ++degree[b];
-      const int ra = find(a), rb = find(b);
-      root[std::max(ra, rb)] = std::min(ra, rb);
-    }
-    std::set<int> pieces;
-    for (const auto& [a, r] : root) pieces.insert(find(a));
-    if (pieces.size() < 2) continue;
-    int vertex = 0;
-    std::set<std::string> where;
-    for (Eigen::Index v = 0; v < particle.size(); ++v) {
-      if (particle[v] == id) vertex = static_cast<int>(v), where.insert(garment.panels[static_cast<std::size_t>(garment.vertex_panel[v])].name);
-    }
-    issues.push_back({"pinched_seam", {.item = item(id)}, fmt::format("the cloth of {} would hang together by the single point {}", fmt::join(where, ", "), place_text(garment, vertex)), "check the order and direction of the edges in the seams that meet there", Category::check});
-    if (issues.size() >= enough) break;
   }
   return issues;
 }

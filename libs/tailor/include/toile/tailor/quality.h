@@ -27,6 +27,7 @@ struct SurfaceReport {
   int components = 0;
   int openings = 0;              ///< closed border loops
   int euler = 0;                 ///< particles - edges + faces
+  int branching_edges = 0;       ///< edges of more than two faces, where three or more panels meet
   std::vector<double> opening_lengths;  ///< in panel coordinates, longest first [m]
 };
 SurfaceReport surface_report(const mesh::GarmentMesh& garment);

@@ -76,8 +76,8 @@ struct Sewn {
 /// triangles around are set anew. Panels stay flat. The result does not depend on the order of the seams.
 /// garment  flat panels as from mesh_panels(), without laminates
 /// error    "unknown_panel", "unknown_edge", "unknown_point", "bad_reference", "duplicate_name", "empty_seam",
-///          "same_edge", "not_flat", "unsupported_columns", "already_layered", "seam_length", "twisted_seam",
-///          "bad_match", "seam_conflict", "degenerate_face", "folded_panel", "pinched_seam"
+///          "same_edge", "already_sewn", "not_flat", "unsupported_columns", "already_layered", "seam_length", "twisted_seam",
+///          "bad_match", "seam_conflict", "degenerate_face", "folded_panel"
 Result<Sewn> sew(const mesh::GarmentMesh& garment, const SewParams& params);
 
 }  // namespace toile::tailor
