@@ -1,0 +1,286 @@
+#include "toile/io/body_import.h"
+
+#include "toile/io/file.h"
+#include "toile/mesh/topology.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <Eigen/Geometry>
+#include <cstring>
+#include <filesystem>
+#include <functional>
+
+using namespace toile;
+
+namespace {
+
+/// A box of width 0.4, height 1.6, depth 0.3 m with corners at the origin; faces outward.
+struct Box {
+  mesh::Points3 x{8, 3};
+  mesh::Triangles faces{12, 3};
+  Box() {
+    for (int i = 0; i < 8; ++i) x.row(i) << 0.4 * (i & 1), 1.6 * (i >> 1 & 1), 0.3 * (i >> 2 & 1);
+    faces << 0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4, 2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5;
+  }
+};
+
+std::string obj(const Box& box, double scale = 1) {
+  std::string s;
+  for (Eigen::Index i = 0; i < box.x.rows(); ++i) s += fmt::format("v {} {} {}\n", scale * box.x(i, 0), scale * box.x(i, 1), scale * box.x(i, 2));
+  for (Eigen::Index f = 0; f < box.faces.rows(); ++f) s += fmt::format("f {} {} {}\n", box.faces(f, 0) + 1, box.faces(f, 1) + 1, box.faces(f, 2) + 1);
+  return s;
+}
+
+std::string ascii_stl(const Box& box) {
+  std::string s = "solid box\n";
+  for (Eigen::Index f = 0; f < box.faces.rows(); ++f) {
+    s += "facet normal 0 0 0\nouter loop\n";
+    for (int k = 0; k < 3; ++k) s += fmt::format("vertex {} {} {}\n", box.x(box.faces(f, k), 0), box.x(box.faces(f, k), 1), box.x(box.faces(f, k), 2));
+    s += "endloop\nendfacet\n";
+  }
+  return s + "endsolid box\n";
+}
+
+std::string binary_stl(const Box& box) {
+  std::string s(80, ' ');
+  const auto put = [&s](auto value) {
+    char bytes[sizeof value];
+    std::memcpy(bytes, &value, sizeof value);
+    s.append(bytes, sizeof value);
+  };
+  put(static_cast<std::uint32_t>(box.faces.rows()));
+  for (Eigen::Index f = 0; f < box.faces.rows(); ++f) {
+    for (int k = 0; k < 3; ++k) put(0.0f);
+    for (int k = 0; k < 3; ++k) {
+      for (int c = 0; c < 3; ++c) put(static_cast<float>(box.x(box.faces(f, k), c)));
+    }
+    put(static_cast<std::uint16_t>(0));
+  }
+  return s;
+}
+
+std::string ply(const Box& box) {
+  std::string s = fmt::format("ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n", box.x.rows());
+  s += fmt::format("element face {}\nproperty list uchar int vertex_indices\nend_header\n", box.faces.rows());
+  for (Eigen::Index i = 0; i < box.x.rows(); ++i) s += fmt::format("{} {} {}\n", box.x(i, 0), box.x(i, 1), box.x(i, 2));
+  for (Eigen::Index f = 0; f < box.faces.rows(); ++f) s += fmt::format("3 {} {} {}\n", box.faces(f, 0), box.faces(f, 1), box.faces(f, 2));
+  return s;
+}
+
+/// glTF with the buffer inside, and a node that doubles the size and mirrors x.
+std::string gltf(const Box& box, const std::string& node) {
+  std::string bytes;
+  const auto put = [&bytes](auto value) {
+    char b[sizeof value];
+    std::memcpy(b, &value, sizeof value);
+    bytes.append(b, sizeof value);
+  };
+  for (Eigen::Index i = 0; i < box.x.size(); ++i) put(static_cast<float>(box.x.data()[i]));
+  for (Eigen::Index i = 0; i < box.faces.size(); ++i) put(static_cast<std::uint16_t>(box.faces.data()[i]));
+  static constexpr char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string base64;
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    std::uint32_t word = 0;
+    for (std::size_t k = 0; k < 3; ++k) word = word << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0);
+    for (int k = 3; k >= 0; --k) base64 += i + (3 - k) > bytes.size() && k < 2 ? '=' : digits[word >> (6 * k) & 63];
+  }
+  return fmt::format(
+      R"({{"asset": {{"version": "2.0"}}, "scene": 0, "scenes": [{{"nodes": [0]}}], "nodes": [{{"mesh": 0{}}}],
+"meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}, "indices": 1}}]}}],
+"accessors": [{{"bufferView": 0, "componentType": 5126, "count": 8, "type": "VEC3", "min": [0, 0, 0], "max": [0.4, 1.6, 0.3]}},
+{{"bufferView": 1, "componentType": 5123, "count": 36, "type": "SCALAR"}}],
+"bufferViews": [{{"buffer": 0, "byteOffset": 0, "byteLength": 96}}, {{"buffer": 0, "byteOffset": 96, "byteLength": 72}}],
+"buffers": [{{"byteLength": {}, "uri": "data:application/octet-stream;base64,{}"}}]}})",
+      node, bytes.size(), base64);
+}
+
+class Folder {
+ public:
+  Folder() : path_(std::filesystem::temp_directory_path() / fmt::format("toile-body-{}", getpid())) { std::filesystem::create_directories(path_); }
+  ~Folder() { std::filesystem::remove_all(path_); }
+  std::string write(const std::string& name, const std::string& bytes) const {
+    const std::string file = (path_ / name).string();
+    EXPECT_TRUE(ok(io::write_file(file, bytes)));
+    return file;
+  }
+
+ private:
+  std::filesystem::path path_;
+};
+
+std::string codes(const Result<io::ImportedBody>& result) {
+  std::string all;
+  if (result) return "";
+  for (const Issue& issue : result.issues()) {
+    all += (all.empty() ? "" : " ") + issue.code;
+    EXPECT_FALSE(issue.remedy.empty()) << to_string(issue);
+  }
+  return all;
+}
+
+}  // namespace
+
+TEST(body_import, every_format_gives_the_same_box) {
+  const Folder folder;
+  const Box box;
+  const std::vector<std::pair<std::string, std::string>> files = {
+      {"box.obj", obj(box)}, {"ascii.stl", ascii_stl(box)}, {"binary.stl", binary_stl(box)}, {"box.ply", ply(box)}, {"box.gltf", gltf(box, "")}};
+  for (const auto& [name, bytes] : files) {
+    const auto body = io::import_body(folder.write(name, bytes), {});
+    ASSERT_TRUE(body) << name << " " << to_string(body.issues()[0]);
+    EXPECT_EQ(body->mesh.x.rows(), 8) << name;
+    EXPECT_EQ(body->mesh.faces.rows(), 12) << name;
+    EXPECT_EQ(body->pieces.size(), 1u);
+    EXPECT_NEAR(mesh::volume(body->mesh.x, body->mesh.faces), 0.4 * 1.6 * 0.3, 1e-7) << name;
+    EXPECT_TRUE(ok(mesh::validate(body->mesh)));
+  }
+}
+
+TEST(body_import, hollow_polygons_are_cut_into_triangles) {
+  // An L-shaped prism: two six-sided ends and six quadrangles.
+  const Folder folder;
+  const std::vector<std::array<double, 2>> outline = {{0, 0}, {1, 0}, {1, 0.25}, {0.25, 0.25}, {0.25, 1}, {0, 1}};
+  std::string s;
+  for (const double z : {0.0, 0.5}) {
+    for (const auto& p : outline) s += fmt::format("v {} {} {}\n", p[0], p[1], z);
+  }
+  s += "f 6 5 4 3 2 1\nf 7 8 9 10 11 12\n";
+  for (int i = 0; i < 6; ++i) s += fmt::format("f {} {} {} {}\n", i + 1, (i + 1) % 6 + 1, (i + 1) % 6 + 7, i + 7);
+  const auto body = io::import_body(folder.write("prism.obj", s), {});
+  ASSERT_TRUE(body) << to_string(body.issues()[0]);
+  EXPECT_EQ(body->mesh.faces.rows(), 20);
+  EXPECT_NEAR(mesh::volume(body->mesh.x, body->mesh.faces), (0.25 + 0.75 * 0.25) * 0.5, 1e-7);
+  // No triangle crosses the notch: the two ends have exactly the outline's area.
+  double area = 0;
+  for (Eigen::Index f = 0; f < body->mesh.faces.rows(); ++f) {
+    const Eigen::Vector3d a = body->mesh.x.row(body->mesh.faces(f, 0)), b = body->mesh.x.row(body->mesh.faces(f, 1)), c = body->mesh.x.row(body->mesh.faces(f, 2));
+    area += (b - a).cross(c - a).norm() / 2;
+  }
+  EXPECT_NEAR(area, 2 * 0.4375 + 4 * 0.5, 1e-6);
+}
+
+TEST(body_import, a_node_that_mirrors_keeps_faces_outward) {
+  const Folder folder;
+  const auto body = io::import_body(folder.write("mirror.gltf", gltf(Box(), R"(, "scale": [-1.5, 1.5, 1.5])")), {});
+  ASSERT_TRUE(body) << to_string(body.issues()[0]);
+  EXPECT_NEAR(body->mesh.x.col(0).minCoeff(), -0.6, 1e-6);
+  EXPECT_NEAR(mesh::volume(body->mesh.x, body->mesh.faces), 3.375 * 0.192, 1e-6);
+}
+
+TEST(body_import, units_and_axes) {
+  const Box box;
+  for (const auto& [unit, scale] : {std::pair{io::LengthUnit::cm, 100.0}, {io::LengthUnit::mm, 1000.0}, {io::LengthUnit::in, 1 / 0.0254}}) {
+    io::BodyImportParams p;
+    p.unit = unit;
+    const auto body = io::import_body(box.x * scale, box.faces, "box", p);
+    ASSERT_TRUE(body);
+    EXPECT_NEAR(body->mesh.x.col(1).maxCoeff(), 1.6, 1e-12);
+  }
+  // A file with z up and -y facing: (x, y, z) of the world is (x, z, -y) of the file.
+  mesh::Points3 turned(8, 3);
+  turned.col(0) = box.x.col(0), turned.col(1) = -box.x.col(2), turned.col(2) = box.x.col(1);
+  io::BodyImportParams p;
+  p.up = io::Axis::z, p.facing = io::Axis::minus_y;
+  const auto body = io::import_body(turned, box.faces, "box", p);
+  ASSERT_TRUE(body) << to_string(body.issues()[0]);
+  const Eigen::RowVector3d high = body->mesh.x.colwise().maxCoeff(), low = body->mesh.x.colwise().minCoeff();
+  EXPECT_TRUE(high.isApprox(Eigen::RowVector3d(0.4, 1.6, 0.3)));
+  EXPECT_TRUE(low.isZero());
+  p.facing = io::Axis::minus_z;
+  EXPECT_EQ(codes(io::import_body(turned, box.faces, "box", p)), "bad_axes");
+}
+
+TEST(body_import, stands_on_the_floor_when_asked) {
+  const Box box;
+  io::BodyImportParams p;
+  p.standing = io::Standing::floor;
+  const auto body = io::import_body(box.x.rowwise() + Eigen::RowVector3d(0, -0.7, 0), box.faces, "box", p);
+  ASSERT_TRUE(body);
+  EXPECT_EQ(body->mesh.x.col(1).minCoeff(), 0);
+}
+
+TEST(body_import, pieces_are_told_apart) {
+  const Box box;
+  mesh::Points3 x(16, 3);
+  x << box.x * 0.1, box.x.rowwise() + Eigen::RowVector3d(0.5, 0, 0);
+  mesh::Triangles faces(24, 3);
+  faces << box.faces, (box.faces.array() + 8).matrix();
+  const auto both = io::import_body(x, faces, "two", {});
+  ASSERT_TRUE(both);
+  ASSERT_EQ(both->pieces.size(), 2u);
+  EXPECT_NEAR(both->pieces[0].volume, 0.192, 1e-12);
+  EXPECT_NEAR(both->pieces[1].volume, 0.000192, 1e-15);
+  EXPECT_EQ(mesh::component_count(both->mesh.faces), 2);
+  io::BodyImportParams p;
+  p.pieces = io::Pieces::largest;
+  const auto one = io::import_body(x, faces, "two", p);
+  ASSERT_TRUE(one);
+  EXPECT_EQ(one->mesh.x.rows(), 8);
+  EXPECT_EQ(one->pieces.size(), 2u);
+  // The small one open: an error, unless it is left out.
+  const auto open = io::import_body(x, faces.bottomRows(23), "two", {});
+  EXPECT_EQ(codes(open), "open_surface");
+  EXPECT_TRUE(io::import_body(x, faces.bottomRows(23), "two", p));
+}
+
+TEST(body_import, must_fail) {
+  const Folder folder;
+  const Box box;
+  Box inward = box;
+  inward.faces.col(1).swap(inward.faces.col(2));
+  Box open = box;
+  open.faces.conservativeResize(10, 3);
+  Box mixed = box;
+  std::swap(mixed.faces(4, 1), mixed.faces(4, 2));
+  Box crowded = box;
+  crowded.x.conservativeResize(9, 3);
+  crowded.x.row(8) << 0.8, 0.8, 0.1;
+  crowded.faces.conservativeResize(13, 3);
+  crowded.faces.row(12) << 1, 3, 8;
+  const std::vector<std::pair<std::string, std::string>> rows = {
+      {codes(io::import_body(folder.write("inward.obj", obj(inward)), {})), "inside_out"},
+      {codes(io::import_body(folder.write("open.obj", obj(open)), {})), "open_surface"},
+      {codes(io::import_body(folder.write("mixed.obj", obj(mixed)), {})), "not_oriented"},
+      {codes(io::import_body(folder.write("crowded.obj", obj(crowded)), {})), "open_surface not_manifold"},
+      {codes(io::import_body(folder.write("mm.obj", obj(box, 1000)), {})), "implausible_size"},
+      {codes(io::import_body(folder.write("mm_open.obj", obj(open, 1000)), {})), "implausible_size open_surface"},
+      {codes(io::import_body(folder.write("empty.obj", ""), {})), "cannot_read"},
+      {codes(io::import_body(folder.write("empty.stl", ""), {})), "cannot_read"},
+      {codes(io::import_body(folder.write("letter.obj", "Dear tailor,\nmy waist is 90 cm.\n"), {})), "cannot_read"},
+      {codes(io::import_body(folder.write("letter.stl", "Dear tailor,\nmy waist is 90 cm.\n"), {})), "cannot_read"},
+      {codes(io::import_body(folder.write("letter.txt", "Dear tailor,\n"), {})), "cannot_read"},
+      {codes(io::import_body(folder.write("cut.ply", ply(box).substr(0, 180)), {})), "cannot_read"},
+      {codes(io::import_body(folder.write("points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n"), {})), "cannot_read"},
+      {codes(io::import_body(folder.write("gone.obj", obj(box)) + "x", {})), "cannot_read"},
+  };
+  for (std::size_t i = 0; i < rows.size(); ++i) EXPECT_EQ(rows[i].first, rows[i].second) << "row " << i;
+}
+
+TEST(body_import, the_error_names_the_unit_that_fits_and_the_place_of_a_hole) {
+  const Box box;
+  const auto size = io::import_body(box.x * 1000, box.faces, "box", {});
+  ASSERT_FALSE(size);
+  EXPECT_NE(size.issues()[0].remedy.find("unit mm would make it 1.6 m"), std::string::npos) << size.issues()[0].remedy;
+  mesh::Triangles faces = box.faces;
+  const auto hole = io::import_body(box.x, faces.topRows(11), "box", {});
+  ASSERT_FALSE(hole);
+  EXPECT_NE(hole.issues()[0].what.find("3 edges"), std::string::npos) << hole.issues()[0].what;
+  EXPECT_NE(hole.issues()[0].what.find("(0.400, 1.600, 0.150) m"), std::string::npos) << hole.issues()[0].what;
+}
+
+TEST(body_import, winding_can_be_mended) {
+  const Box box;
+  io::BodyImportParams p;
+  p.winding = io::Winding::outward;
+  mesh::Triangles faces = box.faces;
+  for (const int f : {0, 3, 4, 7, 11}) std::swap(faces(f, 0), faces(f, 1));
+  const auto body = io::import_body(box.x, faces, "box", p);
+  ASSERT_TRUE(body) << to_string(body.issues()[0]);
+  EXPECT_NEAR(mesh::volume(body->mesh.x, body->mesh.faces), 0.192, 1e-12);
+  faces = box.faces;
+  faces.col(0).swap(faces.col(2));
+  const auto turned = io::import_body(box.x, faces, "box", p);
+  ASSERT_TRUE(turned);
+  EXPECT_NEAR(mesh::volume(turned->mesh.x, turned->mesh.faces), 0.192, 1e-12);
+}

@@ -1,0 +1,49 @@
+// Takes in a body made elsewhere.
+#include "toile/io/body_import.h"
+#include "toile/stage/stage.h"
+
+namespace {
+
+using namespace toile;
+
+struct BodyStage {
+  using Params = io::BodyImportParams;
+
+  static stage::Description description() {
+    return {.name = "toile-body",
+            .version = 1,
+            .summary = "Takes in a body or another support from a mesh file (OBJ, STL, PLY, glTF and others).",
+            .example = "toile-body scan.stl -o body.ply --unit mm --up z --facing -y",
+            .details = "The result is in metres, y up, facing +z. Unit and axes are as stated, never guessed; an implausible size is an error that says "
+                       "which unit would fit. Vertices of exactly equal position become one. The surface has to be closed, with all faces looking outward "
+                       "(or ask for winding: outward). Such a body has no landmarks and no regions.",
+            .inputs = {{.name = "body", .doc = "mesh file", .kind = stage::FileKind::any}},
+            .output = stage::FileKind::support};
+  }
+
+  static Result<stage::Output> run(const Params& params, stage::Run& run) {
+    TOILE_TRY(io::ImportedBody body, io::import_body(run.path("body"), params));
+    run.report("vertices", static_cast<std::size_t>(body.mesh.x.rows()));
+    run.report("faces", static_cast<std::size_t>(body.mesh.faces.rows()));
+    run.report("joined_corners", body.joined_corners);
+    run.report("dropped_faces", body.dropped_faces);
+    run.report("pieces", body.pieces.size());
+    for (std::size_t i = 0; i < body.pieces.size() && i < 20; ++i) {
+      const io::BodyPiece& p = body.pieces[i];
+      run.report(fmt::format("piece_{}", i), fmt::format("{} vertices, {} faces, {:.6f} m3, x {:.3f}..{:.3f} y {:.3f}..{:.3f} z {:.3f}..{:.3f} m", p.vertices, p.faces,
+                                                         p.volume, p.low[0], p.high[0], p.low[1], p.high[1], p.low[2], p.high[2]));
+    }
+    const auto size = (body.mesh.x.colwise().maxCoeff() - body.mesh.x.colwise().minCoeff()).eval();
+    run.report("width", size[0], "m");
+    run.report("height", size[1], "m");
+    run.report("depth", size[2], "m");
+    run.report("volume", mesh::volume(body.mesh.x, body.mesh.faces), "m3");
+    stage::Output output;
+    output.artefact = std::move(body.mesh);
+    return output;
+  }
+};
+
+}  // namespace
+
+int main(int argc, char** argv) { return toile::stage::run_main<BodyStage>(argc, argv); }
