@@ -1,3 +1,4 @@
+#include <Eigen/Geometry>
 #include "toile/contact/search.h"
 
 #include "toile/base/result.h"

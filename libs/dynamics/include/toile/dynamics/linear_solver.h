@@ -1,0 +1,57 @@
+// Preconditioned conjugate gradients on block matrices with contact terms. Sums run over fixed chunks: the same result at
+// any thread count.
+#pragma once
+
+#include "toile/mechanics/block_matrix.h"
+
+#include <array>
+#include <vector>
+
+namespace toile::dynamics {
+
+using mechanics::Block;
+using mechanics::BlockMatrix;
+using mechanics::Float4;
+
+/// A positive semidefinite contribution w w^T (x) block on a few nodes: a contact between nodes that the sheet does not
+/// couple.
+struct ContactTerm {
+  std::array<int, 4> node{-1, -1, -1, -1};  ///< -1: unused
+  std::array<float, 4> weight{};
+  Block block;
+};
+
+struct SolveOptions {
+  double tolerance = 1e-2;  ///< on the preconditioned residual, relative to its start [1]
+  int max_iterations = 400;
+};
+
+struct SolveReport {
+  int iterations = 0;
+  double reduction = 1;  ///< reached [1]
+  bool converged = false;
+};
+
+/// Keeps scratch memory between calls. Precondition of solve: matrix + terms positive definite.
+class LinearSolver {
+ public:
+  /// Prepares the preconditioner. Diagonal blocks of the terms are taken in.
+  void factor(const BlockMatrix& matrix, const std::vector<ContactTerm>& terms);
+  /// matrix * x = b; the start is zero. matrix and terms as in factor().
+  SolveReport solve(const BlockMatrix& matrix, const std::vector<ContactTerm>& terms, const std::vector<Float4>& b, std::vector<Float4>& x, const SolveOptions& options);
+
+ private:
+  bool factor_domain(const BlockMatrix& matrix, std::size_t domain, double shift);
+  void precondition(const std::vector<Float4>& r, std::vector<Float4>& z);
+  void multiply(const BlockMatrix& matrix, const std::vector<ContactTerm>& terms, const std::vector<Float4>& x, std::vector<Float4>& y);
+
+  std::vector<Block> diagonal_;  // of matrix and terms together
+  std::vector<Block> inverse_;   // pivots, inverted
+  std::vector<int> domain_start_;
+  std::vector<int> row_start_, column_;
+  std::vector<Block> lower_;
+  std::vector<int> node_term_start_, node_term_;
+  std::vector<Float4> term_force_, r_, z_, p_, q_;
+};
+
+}  // namespace toile::dynamics

@@ -1,0 +1,104 @@
+// Draping a garment: from placed, with seams open, to hanging at rest; or moving in time. docs/simulation.md tells how.
+#pragma once
+
+#include "toile/base/fields.h"
+#include "toile/base/result.h"
+#include "toile/mesh/garment_mesh.h"
+#include "toile/mesh/support_mesh.h"
+
+#include <functional>
+#include <optional>
+#include <string>
+
+namespace toile::dynamics {
+
+enum class Mode { equilibrium, motion };
+
+struct SimulationParams {
+  Mode mode = Mode::equilibrium;
+  double gravity = 9.81;
+  double residual = 1e-3;
+  int max_iterations = 600;
+  double duration = 1.0;
+  double time_step = 1.0 / 60;
+  int newton_iterations = 4;
+  double air_drag = 0.05;
+  double support_reach = 2e-3;
+  std::optional<double> self_reach;
+  double contact_stiffness = 5e5;
+  std::optional<double> friction;
+  double support_friction = 0.3;
+  int closing_steps = 20;
+  double closing_gravity = 0.1;
+  double seam_stiffness = 500;
+  double seam_gap = 5e-4;
+  double largest_move = 0.02;
+  std::vector<std::string> fixed;
+  std::string log;
+
+  static void describe(auto& f) {
+    f(&SimulationParams::mode, {.key = "mode", .doc = "equilibrium: until the garment hangs at rest; motion: for `duration` from the given velocities"});
+    f(&SimulationParams::gravity, {.key = "gravity", .doc = "acceleration of gravity, downwards (-y)", .unit = "m/s2", .min = 0, .max = 100});
+    f(&SimulationParams::residual, {.key = "residual", .doc = "equilibrium: stop when the sum over all particles of the net force's length is this part of the garment's weight",
+                                    .unit = "1", .min = 1e-9, .max = 1});
+    f(&SimulationParams::max_iterations, {.key = "max_iterations", .doc = "equilibrium: Newton iterations after which the run ends unconverged (exit code 5)", .min = 1, .max = 1e6});
+    f(&SimulationParams::duration, {.key = "duration", .doc = "motion: simulated time", .unit = "s", .min = 0, .max = 1e4});
+    f(&SimulationParams::time_step, {.key = "time_step", .doc = "motion: step; equilibrium: the first step of the pseudo-time", .unit = "s", .min = 1e-6, .max = 1});
+    f(&SimulationParams::newton_iterations, {.key = "newton_iterations", .doc = "motion: Newton iterations a step at most", .min = 1, .max = 100});
+    f(&SimulationParams::air_drag, {.key = "air_drag", .doc = "motion: force per area and velocity that slows the cloth in still air", .unit = "N*s/m3", .min = 0, .max = 100});
+    f(&SimulationParams::support_reach, {.key = "support_reach", .doc = "distance from the support at which it begins to carry the cloth's middle surface", .unit = "m", .min = 1e-4, .max = 0.05});
+    f(&SimulationParams::self_reach, {.key = "self_reach", .doc = "distance between middle surfaces at which cloth begins to carry cloth; not given: the thickest fabric's thickness, at least 0.8 mm",
+                                      .unit = "m", .min = 1e-4, .max = 0.05});
+    f(&SimulationParams::contact_stiffness, {.key = "contact_stiffness", .doc = "pressure in a contact per closing of the gap", .unit = "Pa/m", .min = 1e3, .max = 1e10});
+    f(&SimulationParams::friction, {.key = "friction", .doc = "friction coefficient of cloth on cloth; not given: the greatest MIU of the garment's fabrics", .unit = "1", .min = 0, .max = 5});
+    f(&SimulationParams::support_friction, {.key = "support_friction", .doc = "friction coefficient of cloth on the support", .unit = "1", .min = 0, .max = 5});
+    f(&SimulationParams::closing_steps, {.key = "closing_steps", .doc = "steps in which open seams are drawn together", .min = 1, .max = 10000});
+    f(&SimulationParams::closing_gravity, {.key = "closing_gravity", .doc = "part of gravity that acts while seams are open", .unit = "1", .min = 0, .max = 1});
+    f(&SimulationParams::seam_stiffness, {.key = "seam_stiffness", .doc = "pull on the two sides of a seam while it is open, per particle and distance", .unit = "N/m", .min = 1, .max = 1e6});
+    f(&SimulationParams::seam_gap, {.key = "seam_gap", .doc = "distance at which the two sides of a seam become one", .unit = "m", .min = 1e-6, .max = 0.01});
+    f(&SimulationParams::largest_move, {.key = "largest_move", .doc = "equilibrium: no particle moves farther in one iteration", .unit = "m", .min = 1e-4, .max = 1});
+    f(&SimulationParams::fixed, {.key = "fixed", .doc = "edges and points (panel.edge, panel.point) that are held where they are"});
+    f(&SimulationParams::log, {.key = "log", .doc = "CSV file with one row per iteration: energies, residual, contacts, strains; empty: none"});
+  }
+};
+
+/// How the caller follows a run; any may be empty.
+struct SimulationHooks {
+  std::function<void(double fraction, const std::string& text)> progress;
+  std::function<bool()> interrupted;
+  std::function<void(const char* phase)> phase;  ///< called when a part of the work begins: "sheet", "contact", "solve", "limit", "check", "other"
+};
+
+struct SimulationReport {
+  bool converged = false;
+  double residual = 0;            ///< sum of net force lengths over the weight [1]
+  double residual_max = 0;        ///< greatest net force of a particle [N]
+  int iterations = 0, solver_iterations = 0;
+  double simulated_time = 0;      ///< motion [s]
+  double membrane_energy = 0, bending_energy = 0, potential_energy = 0, contact_energy = 0;  ///< [J]
+  double strain_warp_max = 0, strain_weft_max = 0, strain_warp_99 = 0, strain_weft_99 = 0, shear_max = 0;
+  int contacts = 0;
+  double least_gap = 0;           ///< [m]
+  double seam_gap_max = 0;        ///< before merging; 0 once all are closed [m]
+  int seams_open = 0;             ///< particle pairs not closed
+  int start_inside = 0, start_intersections = 0;
+  double start_move = 0;          ///< farthest that a particle was pushed out of the support at the start [m]
+  int intersections = 0, support_intersections = 0, inside = 0;  ///< at the end, by the exact test
+};
+
+struct SimulationOutcome {
+  mesh::GarmentMesh garment;
+  SimulationReport report;
+  Issues findings;   ///< not_converged, check, interrupted
+  std::string log;   ///< CSV
+};
+
+/// error  what make_sheet reports; "bad_support" when the support is not valid
+Result<SimulationOutcome> simulate(const mesh::GarmentMesh& garment, const std::optional<mesh::SupportMesh>& support, const SimulationParams& params, const SimulationHooks& hooks = {});
+
+}  // namespace toile::dynamics
+
+template <>
+struct toile::Choices<toile::dynamics::Mode> {
+  static constexpr std::array names{std::pair{"equilibrium", toile::dynamics::Mode::equilibrium}, std::pair{"motion", toile::dynamics::Mode::motion}};
+};

@@ -1,0 +1,100 @@
+// A garment as a mechanical system: nodes with mass, membrane triangles, bending, links. Pure functions of positions.
+// Forces of contact are not here (libs/dynamics).
+#pragma once
+
+#include "toile/base/result.h"
+#include "toile/fabric/constitutive.h"
+#include "toile/mechanics/block_matrix.h"
+#include "toile/mechanics/membrane.h"
+#include "toile/mesh/garment_mesh.h"
+
+#include <array>
+#include <vector>
+
+namespace toile::mechanics {
+
+using mesh::Ids;
+using mesh::Points3;
+
+/// A symmetric sparse matrix that acts alike on x, y and z.
+struct ScalarMatrix {
+  std::vector<int> row_start, column;
+  std::vector<double> value;
+};
+
+/// Energy stiffness/2 |x_a - x_b - offset|^2: draws the two sides of an open seam together as the offset shrinks.
+struct Link {
+  int a = 0, b = 0;
+  double stiffness = 0;  ///< [N/m]
+};
+
+/// Energy stiffness/2 (|x_a - x_b| - length)^2: a closed button.
+struct Spring {
+  int a = 0, b = 0;
+  double stiffness = 0;  ///< [N/m]
+  double length = 0;     ///< [m]
+};
+
+struct SheetOptions {
+  double link_stiffness = 500;   ///< of open seams, per node pair [N/m]
+  double fastener_stiffness = 500;  ///< [N/m]
+};
+
+struct Sheet {
+  int node_count = 0;
+  Ids node_of_vertex;                      ///< |garment vertices|
+  std::vector<std::array<int, 3>> corners; ///< node ids, |F|
+  std::vector<TriangleShape> shapes;       ///< |F|
+  std::vector<int> fabric_of_face;         ///< index into fabrics, |F|
+  std::vector<fabric::Constitutive> fabrics;
+  Eigen::VectorXd mass;                    ///< [kg], |nodes|
+  Eigen::VectorXd area;                    ///< rest area that belongs to each node [m2]
+  ScalarMatrix bending;                    ///< constant: gradient = bending * x [N/m]
+  std::vector<Link> links;
+  std::vector<Spring> springs;
+
+  // where things go (fixed gather order, so that sums do not depend on threads)
+  std::vector<int> node_corner_start, node_corner;     ///< 3 * face + corner around each node
+  std::vector<int> node_link_start, node_link;         ///< 2 * link + end around each node; springs follow links
+  std::vector<int> row_start, column, diagonal;        ///< block pattern of the second derivative
+  std::vector<int> block_part_start, block_part;       ///< 9 * face + 3 * a + b per block
+  std::vector<double> constant_part;                   ///< bending and links of each block, times identity [N/m]
+};
+
+/// node_of_vertex  vertices with the same id are one point; ids dense from 0
+/// Welds between different nodes become links, between equal nodes seams that bend with their bending_factor.
+/// error  "no_laminate" for each panel with a face that has no laminate, "bad_fabric", "degenerate_triangle"
+Result<Sheet> make_sheet(const mesh::GarmentMesh& garment, const Ids& node_of_vertex, const SheetOptions& options);
+
+/// Energies by kind [J].
+struct SheetEnergy {
+  double membrane = 0, bending = 0, links = 0;
+  double total() const { return membrane + bending + links; }
+};
+
+/// Scratch memory and results of one evaluation.
+struct SheetResponse {
+  SheetEnergy energy;
+  Points3 gradient;  ///< [N], |nodes| x 3
+  BlockMatrix matrix;
+  std::vector<Eigen::Matrix<double, 3, 3>> corner_force;  ///< columns: gradient at the corners of each face
+  std::vector<std::array<Eigen::Matrix3d, 6>> face_blocks;
+};
+
+/// x             [m], |nodes| x 3
+/// link_offset   [m], |links| x 3
+SheetEnergy energy(const Sheet& sheet, const Points3& x, const Points3& link_offset);
+
+/// Energy and gradient, and unless `curvature` is empty the second derivative, into `response`.
+void evaluate(const Sheet& sheet, const Points3& x, const Points3& link_offset, std::optional<Curvature> curvature, SheetResponse& response);
+
+/// Largest and 99th percentile of |strain| over faces.
+struct StrainSummary {
+  double warp_max = 0, weft_max = 0, warp_99 = 0, weft_99 = 0;  ///< extension only [1]
+  double shear_max = 0;                                        ///< [rad]
+};
+StrainSummary strain_summary(const Sheet& sheet, const Points3& x);
+
+YarnGradient yarn_gradient(const Sheet& sheet, const Points3& x, std::size_t face);
+
+}  // namespace toile::mechanics
