@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <optional>
 
 namespace toile::contact {
 namespace {
@@ -28,6 +29,12 @@ struct Positions {
 
 struct Candidate {
   int a, b;  // local primitive ids
+};
+
+// A pair of a list and its distance at the reference [m], rounded down.
+struct Near {
+  Candidate pair;
+  float distance;
 };
 
 struct Impact {
@@ -87,7 +94,7 @@ struct Search::Impl {
     double reach = 0;
     std::vector<Vec> reference, support_reference;
     std::vector<Vec> previous, support_previous;  // positions of the last call: how fast things move
-    std::vector<std::array<std::vector<Candidate>, 5>> chunks;
+    std::vector<std::array<std::vector<Near>, 5>> chunks;
   };
   NearList near_self, near_support;
   double slack = 0;  // what a list reaches beyond the radius asked for [m]
@@ -365,25 +372,28 @@ struct Search::Impl {
     return x.empty() ? Vec(Vec::Zero()) : Vec(0.5 * (all.lo + all.hi));
   }
 
-  // Whether every cloth-cloth pair that comes within `radius` at x, at y or anywhere between is in the list: a pair's
-  // distance changes by no more than its two sides move against the common shift.
-  bool self_list_covers(const std::vector<Vec>& x, const std::vector<Vec>& y, double radius) const {
-    if (!near_self.valid || near_self.reference.size() != x.size()) return false;
+  // The distance that pairs coming within `radius` at x, at y or anywhere between had at most at the list's reference: a
+  // pair's distance changes by no more than its two sides move against a common shift. Nothing if the list does not
+  // reach that far.
+  std::optional<double> self_list_distance(const std::vector<Vec>& x, const std::vector<Vec>& y, double radius) const {
+    if (!near_self.valid || near_self.reference.size() != x.size()) return {};
     const Vec shift = common_shift(x, near_self.reference);
     double way = farthest(x, near_self.reference, shift);
     if (&y != &x) way = std::max(way, farthest(y, near_self.reference, shift));
-    return near_self.reach - 2 * way > radius * (1 + 1e-9);
+    const double needed = (radius + 2 * way) * (1 + 1e-9);
+    return needed < near_self.reach ? std::optional(needed) : std::nullopt;
   }
-  bool support_list_covers(const std::vector<Vec>& x, const std::vector<Vec>& y, const std::vector<Vec>& s, const std::vector<Vec>& t,
-                           double radius) const {
+  std::optional<double> support_list_distance(const std::vector<Vec>& x, const std::vector<Vec>& y, const std::vector<Vec>& s,
+                                              const std::vector<Vec>& t, double radius) const {
     const NearList& list = near_support;
-    if (!list.valid || list.reference.size() != x.size()) return false;
+    if (!list.valid || list.reference.size() != x.size()) return {};
     double way = farthest(x, list.reference, Vec::Zero()), support_way = farthest(s, list.support_reference, Vec::Zero());
     if (&y != &x) {
       way = std::max(way, farthest(y, list.reference, Vec::Zero()));
       support_way = std::max(support_way, farthest(t, list.support_reference, Vec::Zero()));
     }
-    return list.reach - way - support_way > radius * (1 + 1e-9);
+    const double needed = (radius + way + support_way) * (1 + 1e-9);
+    return needed < list.reach ? std::optional(needed) : std::nullopt;
   }
 
   // A list pays when things move so slowly that the next call will find it valid.
@@ -394,7 +404,7 @@ struct Search::Impl {
     if (surely_apart<type<kind>()>(x, list.reach)) return;
     const Closest found_at = closest<type<kind>()>(x);
     if (!(found_at.distance_sq < list.reach * list.reach)) return;
-    list.chunks[&chunk - chunks.data()][static_cast<int>(kind)].push_back(c);
+    list.chunks[&chunk - chunks.data()][static_cast<int>(kind)].push_back({c, static_cast<float>(std::sqrt(found_at.distance_sq) * (1 - 1e-7))});
     if (found_at.distance_sq < radius * radius) add_contact<kind>(chunk, c, n, x, found_at);
   }
   void start_list(NearList& list, double radius) {
@@ -407,10 +417,12 @@ struct Search::Impl {
     }
   }
   template <class Body>
-  void for_list(const NearList& list, const Body& body) {
+  void for_list(const NearList& list, double distance, const Body& body) {
     parallel_for(chunks.size(), 1, [&](std::size_t i) {
       const auto run = [&]<Kind kind>() {
-        for (const Candidate& c : list.chunks[i][static_cast<int>(kind)]) body.template operator()<kind>(chunks[i], c);
+        for (const Near& near : list.chunks[i][static_cast<int>(kind)]) {
+          if (near.distance < distance) body.template operator()<kind>(chunks[i], near.pair);
+        }
       };
       run.template operator()<Kind::vertex_face>();
       run.template operator()<Kind::edge_edge>();
@@ -422,11 +434,11 @@ struct Search::Impl {
 
   void find_near_self(double radius) {
     const std::vector<Vec>& x = cloth_at.x;
-    const bool covered = self_list_covers(x, x, radius);
+    const std::optional<double> distance = self_list_distance(x, x, radius);
     const bool slow = near_self.previous.size() != x.size() || 2 * farthest(x, near_self.previous, common_shift(x, near_self.previous)) < slack;
     near_self.previous = x;
-    if (covered) {
-      for_list(near_self, [&]<Kind kind>(Chunk& chunk, const Candidate& c) { test_near<kind>(chunk, c, radius); });
+    if (distance) {
+      for_list(near_self, *distance, [&]<Kind kind>(Chunk& chunk, const Candidate& c) { test_near<kind>(chunk, c, radius); });
     } else if (slow) {
       start_list(near_self, radius);
       self_boxes.refit(cloth_tree, x, x, 0.5 * near_self.reach);
@@ -441,13 +453,13 @@ struct Search::Impl {
     support_at.load(support_tree, support_x);
     const std::vector<Vec>& s = support_at.x;
     NearList& list = near_support;
-    const bool covered = support_list_covers(x, x, s, s, radius);
+    const std::optional<double> distance = support_list_distance(x, x, s, s, radius);
     const bool slow = list.previous.size() != x.size() ||
                       farthest(x, list.previous, Vec::Zero()) + farthest(s, list.support_previous, Vec::Zero()) < slack;
     list.previous = x;
     list.support_previous = s;
-    if (covered) {
-      for_list(list, [&]<Kind kind>(Chunk& chunk, const Candidate& c) { test_near<kind>(chunk, c, radius); });
+    if (distance) {
+      for_list(list, *distance, [&]<Kind kind>(Chunk& chunk, const Candidate& c) { test_near<kind>(chunk, c, radius); });
       return;
     }
     load_support(support_x, support_x);
@@ -529,15 +541,16 @@ struct Search::Impl {
     TOILE_CHECK(std::isfinite(sum), "displacements are not finite, sum of squares {}", sum);
     // The boxes hold the whole ways at any fraction, so the candidates stay complete however nodes are rewound. Growth by
     // 1.1 separations would do (nearer is an impact); the rest covers rounding.
-    if (self_list_covers(cloth_from.x, cloth_to.x, 1.2 * o.self_separation)) {
-      for_list(near_self, [&]<Kind kind>(Chunk& chunk, const Candidate& c) { add_candidate<kind>(chunk, c, o.self_separation); });
+    if (const auto distance = self_list_distance(cloth_from.x, cloth_to.x, 1.2 * o.self_separation)) {
+      for_list(near_self, *distance, [&]<Kind kind>(Chunk& chunk, const Candidate& c) { add_candidate<kind>(chunk, c, o.self_separation); });
     } else {
       self_boxes.refit(cloth_tree, cloth_from.x, cloth_to.x, 0.6 * o.self_separation);
       self_pairs([&]<Kind kind>(Chunk& chunk, const Candidate& c) { add_candidate<kind>(chunk, c, o.self_separation); });
     }
     if (!has_support) return;
-    if (support_list_covers(cloth_from.x, cloth_to.x, support_from.x, support_to.x, 1.2 * o.support_separation)) {
-      for_list(near_support, [&]<Kind kind>(Chunk& chunk, const Candidate& c) { add_candidate<kind>(chunk, c, o.support_separation); });
+    if (const auto distance =
+            support_list_distance(cloth_from.x, cloth_to.x, support_from.x, support_to.x, 1.2 * o.support_separation)) {
+      for_list(near_support, *distance, [&]<Kind kind>(Chunk& chunk, const Candidate& c) { add_candidate<kind>(chunk, c, o.support_separation); });
     } else {
       against_boxes.refit(cloth_tree, cloth_from.x, cloth_to.x, 1.2 * o.support_separation);
       support_pairs([&]<Kind kind>(Chunk& chunk, const Candidate& c) { add_candidate<kind>(chunk, c, o.support_separation); });
