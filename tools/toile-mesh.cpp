@@ -4,6 +4,8 @@
 #include "toile/tailor/mesh_panels.h"
 #include "toile/tailor/quality.h"
 
+#include <cmath>
+
 namespace {
 
 using namespace toile;
@@ -60,6 +62,14 @@ struct MeshStage {
       run.warn({"sharp_triangles", {.file = path, .item = tailor::place_text(*garment, garment->faces(angles.least_face, 0))},
                 fmt::format("{} triangles have an angle below 20 degrees, the smallest {:.1f}", angles.below_20, angles.least),
                 "use smaller cells, or cells of more equal sides", Category::check});
+    }
+    const Eigen::VectorXd areas = mesh::rest_areas(*garment);
+    for (const auto& panel : garment->panels) {
+      double area = 0;
+      for (Eigen::Index f = 0; f < areas.size(); ++f) area += garment->face_panel[f] == panel.id ? areas[f] : 0;
+      if (std::abs(area / panel.cut_area - 1) > 0.01) {
+        run.warn({"coarse_grid", {.file = path, .item = panel.name}, fmt::format("the mesh area is {:+.1f} % off the area inside the true outline", 100 * (area / panel.cut_area - 1)), "use smaller cells for this panel", Category::check});
+      }
     }
     return stage::Output{std::move(*garment), {}, {}};
   }

@@ -249,7 +249,9 @@ TEST(mesh_panels, mirrored_copy_is_the_exact_mirror_image) {
     ASSERT_TRUE(edge);
     EXPECT_NEAR(run.length, edge->curve.length(), 1e-12);
     for (const auto& row : g.run_vertices) {
-      if (row.run == run.id) EXPECT_NEAR((g.uv.row(row.vertex).transpose() - edge->curve.point_at(row.s)).norm(), 0, 1e-9);
+      if (row.run == run.id) {
+        EXPECT_NEAR((g.uv.row(row.vertex).transpose() - edge->curve.point_at(row.s)).norm(), 0, 1e-9);
+      }
     }
   }
 }

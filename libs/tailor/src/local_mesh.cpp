@@ -397,10 +397,17 @@ double quality_in(const LocalMesh& mesh, int t) {
 
 }  // namespace
 
-int improve(LocalMesh& mesh, const ImproveOptions& options) {
+void improve(LocalMesh& mesh, const ImproveOptions& options) {
   const double wanted = options.target + 2;  // some room above what is promised
-  std::vector<int> pending(mesh.triangles.size());
-  for (std::size_t t = 0; t < pending.size(); ++t) pending[t] = static_cast<int>(t);
+  std::vector<int> pending;
+  if (options.around.empty()) {
+    pending.resize(mesh.triangles.size());
+    for (std::size_t t = 0; t < pending.size(); ++t) pending[t] = static_cast<int>(t);
+  } else {
+    for (int v : options.around) pending.insert(pending.end(), mesh.stars[v].begin(), mesh.stars[v].end());
+    std::sort(pending.begin(), pending.end());
+    pending.erase(std::unique(pending.begin(), pending.end()), pending.end());
+  }
   for (int pass = 0; pass < options.passes; ++pass) {
     std::vector<std::pair<double, int>> bad;
     for (int t : pending) {
@@ -454,11 +461,6 @@ int improve(LocalMesh& mesh, const ImproveOptions& options) {
     touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
     pending = std::move(touched);
   }
-  int below = 0;
-  for (int t = 0; t < static_cast<int>(mesh.triangles.size()); ++t) {
-    if (mesh.triangles[t][0] >= 0 && quality_in(mesh, t) < options.target) ++below;
-  }
-  return below;
 }
 
 int split_edge(LocalMesh& mesh, int a, int b, const LocalVertex& vertex) {

@@ -45,14 +45,15 @@ struct ImproveOptions {
   bool may_split_border = true;
   double shortest_edge = 0.2;  ///< no insertion makes an edge shorter than this
   int passes = 12;
+  /// Only triangles around these vertices are looked at first; empty: all.
+  std::vector<int> around;
   /// Position on a curve; not called where no vertex slides.
   std::function<Point(int curve, double s)> curve_point;
 };
 
 /// Raises the smallest angles by edge flips, moving vertices, removing and inserting them. Only the neighbourhoods of
 /// bad triangles change. An angle between two border edges belongs to the outline and does not count.
-/// ret  number of triangles still below the target
-int improve(LocalMesh& mesh, const ImproveOptions& options);
+void improve(LocalMesh& mesh, const ImproveOptions& options);
 
 /// Puts a vertex into an edge and cuts the triangles at it; returns the vertex. Precondition: the edge exists.
 int split_edge(LocalMesh& mesh, int a, int b, const LocalVertex& vertex);

@@ -8,6 +8,7 @@
 #include <limits>
 #include <map>
 #include <numbers>
+#include <optional>
 #include <set>
 
 namespace toile::tailor {
@@ -18,6 +19,8 @@ using pattern::Curve;
 constexpr double border_clearance = 0.6;  ///< grid nodes keep this distance from border, lines and marks [cells]
 constexpr double same_place = 1e-7;       ///< [cells]
 constexpr double same_point = 1e-6;       ///< a named point this near to an edge's end is that end [m]
+constexpr double on_axis = 1e-9;          ///< a fold line this straight up or across is a grid line [m]
+constexpr const char* fold_edge = "(fold)";
 constexpr double sharp_turn = 0.35;       ///< a curve that turns this much at once has a corner there [rad]
 
 /// (u, v) in metres to cells and back. The grid starts at the panel's left and lower end (on the fold if there is one):
@@ -186,9 +189,7 @@ struct Grid {
   bool has(int i, int j) const { return i >= i0 && j >= j0 && i < i0 + ni && j < j0 + nj; }
 };
 
-}  // namespace
-
-Result<PanelMesh> mesh_panel(const pattern::CutPanel& panel, const GridSettings& settings) {
+Result<PanelMesh> mesh_whole(const pattern::CutPanel& panel, const GridSettings& settings, const std::optional<std::pair<Point, Point>>& fold) {
   const auto trouble = [&](Issue issue) {
     issue.place.item = panel.name;
     return issue;
@@ -223,7 +224,8 @@ Result<PanelMesh> mesh_panel(const pattern::CutPanel& panel, const GridSettings&
     }
   }
   cells.origin = low;
-  if (panel.fold && std::abs(panel.fold->first.x() - panel.fold->second.x()) < 1e-9) cells.origin.x() = panel.fold->first.x();
+  if (fold && std::abs(fold->first.x() - fold->second.x()) < on_axis) cells.origin.x() = fold->first.x();
+  if (fold && std::abs(fold->first.y() - fold->second.y()) < on_axis) cells.origin.y() = fold->first.y();
   {
     const Point extent = cells(high) - cells(low);
     if (extent.x() * extent.y() > 5e8) return trouble({"fine_grid", {}, fmt::format("{:.0f} x {:.0f} cells are too many", extent.x(), extent.y()), "choose larger cells"});
@@ -573,6 +575,197 @@ Result<PanelMesh> mesh_panel(const pattern::CutPanel& panel, const GridSettings&
     result.points.push_back({point.name, number[point.vertex]});
   }
   return result;
+}
+
+/// One half of a panel that was unfolded about a grid line, and the names of what lies on the other half.
+struct Half {
+  pattern::CutPanel panel;
+  std::map<std::string, std::string> other_edge, other_line, other_point;  ///< name here -> name of its mirror image
+  int axis = 0;        ///< coordinate that the fold line holds constant
+  double at = 0;       ///< its value
+};
+
+std::optional<Half> half_of(const pattern::CutPanel& panel) {
+  if (!panel.fold) return std::nullopt;
+  Half half;
+  const Point p = panel.fold->first, q = panel.fold->second;
+  if (std::abs(p.x() - q.x()) < on_axis) half.axis = 0;
+  else if (std::abs(p.y() - q.y()) < on_axis) half.axis = 1;
+  else return std::nullopt;
+  half.at = p[half.axis];
+  const auto side = [&](const Point& at) { return at[half.axis] - half.at; };
+  const auto image = [&](Point at) {
+    at[half.axis] = 2 * half.at - at[half.axis];
+    return at;
+  };
+  const auto same = [](const Point& a, const Point& b) { return (a - b).norm() < 1e-9; };
+
+  half.panel = panel;
+  half.panel.fold.reset();
+  // The edges on the positive side are one stretch of the outline, from one end of the fold to the other.
+  const std::size_t n = panel.outline.size();
+  const auto positive = [&](const pattern::PanelEdge& edge) { return side(edge.curve.point_at(0.5 * edge.curve.length())) > 0; };
+  std::size_t start = n;
+  for (std::size_t k = 0; k < n; ++k) {
+    if (!positive(panel.outline[k]) || positive(panel.outline[(k + n - 1) % n])) continue;
+    if (start < n) return std::nullopt;
+    start = k;
+  }
+  if (start == n) return std::nullopt;
+  half.panel.outline.clear();
+  for (std::size_t k = start; positive(panel.outline[k % n]) && k < start + n; ++k) half.panel.outline.push_back(panel.outline[k % n]);
+  if (2 * half.panel.outline.size() != n) return std::nullopt;
+  const Point first = half.panel.outline.front().curve.from(), last = half.panel.outline.back().curve.to();
+  if (std::abs(side(first)) > on_axis || std::abs(side(last)) > on_axis) return std::nullopt;
+  // Where the outline meets the fold at less than 20 degrees the two halves are better meshed as one.
+  const Point along = (first - last).normalized();
+  const double steepest = std::cos(20 * std::numbers::pi / 180);
+  if (half.panel.outline.front().curve.tangent_at(0).dot(-along) > steepest || half.panel.outline.back().curve.tangent_at(half.panel.outline.back().curve.length()).dot(-along) > steepest) return std::nullopt;
+
+  const auto pair_curves = [&](const auto& here, const auto& all, std::map<std::string, std::string>& names, bool reversed) {
+    for (const auto& item : here) {
+      for (const auto& other : all) {
+        const Point from = reversed ? other.curve.to() : other.curve.from(), to = reversed ? other.curve.from() : other.curve.to();
+        const double length = item.curve.length();
+        if (other.name != item.name && std::abs(other.curve.length() - length) < 1e-9 && same(image(item.curve.from()), from) && same(image(item.curve.to()), to) &&
+            same(image(item.curve.point_at(0.3 * length)), other.curve.point_at((reversed ? 0.7 : 0.3) * length))) names[item.name] = other.name;
+      }
+      if (!names.count(item.name)) return false;
+    }
+    return true;
+  };
+  if (!pair_curves(half.panel.outline, panel.outline, half.other_edge, true)) return std::nullopt;
+  half.panel.outline.push_back({fold_edge, "", "", pattern::Curve({pattern::line_segment(last, first)})});
+
+  half.panel.holes.clear();
+  std::vector<pattern::PanelEdge> all_hole_edges;
+  for (const auto& hole : panel.holes) all_hole_edges.insert(all_hole_edges.end(), hole.edges.begin(), hole.edges.end());
+  for (const auto& hole : panel.holes) {
+    const bool here = positive(hole.edges.front());
+    for (const auto& edge : hole.edges) {
+      if (positive(edge) != here) return std::nullopt;
+    }
+    if (!here) continue;
+    half.panel.holes.push_back(hole);
+    if (!pair_curves(hole.edges, all_hole_edges, half.other_edge, true)) return std::nullopt;
+  }
+  if (2 * half.panel.holes.size() != panel.holes.size()) return std::nullopt;
+
+  half.panel.lines.clear();
+  for (const auto& line : panel.lines) {
+    if (side(line.curve.point_at(0.5 * line.curve.length())) > 0) half.panel.lines.push_back(line);
+  }
+  if (2 * half.panel.lines.size() != panel.lines.size() || !pair_curves(half.panel.lines, panel.lines, half.other_line, false)) return std::nullopt;
+
+  const auto keep_points = [&](auto& list, const auto& all) {
+    list.clear();
+    for (const auto& point : all) {
+      if (side(point.at) < -on_axis) continue;
+      list.push_back(point);
+      if (side(point.at) <= on_axis) continue;
+      for (const auto& other : all) {
+        if (other.name != point.name && same(image(point.at), other.at)) half.other_point[point.name] = other.name;
+      }
+    }
+  };
+  keep_points(half.panel.points, panel.points);
+  keep_points(half.panel.notches, panel.notches);
+  keep_points(half.panel.marks, panel.marks);
+  for (const auto& notch : half.panel.notches) {
+    // A notch at the fold may be told from the other half's edge.
+    if (!half.other_edge.count(notch.edge)) return std::nullopt;
+  }
+  return half;
+}
+
+/// Both halves, joined along the vertices of the fold line.
+PanelMesh unfolded(const PanelMesh& mesh, const Half& half, const pattern::CutPanel& panel, const GridSettings& settings) {
+  const int count = static_cast<int>(mesh.uv.rows());
+  std::vector<char> on_fold(static_cast<std::size_t>(count), 0);
+  for (const GridRun& run : mesh.runs) {
+    if (run.name != fold_edge) continue;
+    for (const auto& [v, s] : run.vertices) on_fold[static_cast<std::size_t>(v)] = 1;
+  }
+  std::vector<int> number(2 * static_cast<std::size_t>(count), -1);  // second half: mirror images
+  int next = 0;
+  const auto id = [&](int v, bool mirrored) {
+    int& known = number[static_cast<std::size_t>(v + (mirrored && !on_fold[static_cast<std::size_t>(v)] ? count : 0))];
+    if (known < 0) known = next++;
+    return known;
+  };
+  PanelMesh result;
+  const auto add_run = [&](const std::string& name) {
+    for (const GridRun& run : mesh.runs) {
+      const auto& others = run.internal ? half.other_line : half.other_edge;
+      const auto other = others.find(run.name);
+      if (run.name != name && (other == others.end() || other->second != name)) continue;
+      const bool mirrored = run.name != name, turned = mirrored && !run.internal;
+      GridRun copy = run;
+      copy.name = name;
+      if (turned) {
+        std::reverse(copy.vertices.begin(), copy.vertices.end());
+        for (auto& [v, s] : copy.vertices) s = run.length - s;
+      }
+      for (auto& [v, s] : copy.vertices) v = id(v, mirrored);
+      result.runs.push_back(std::move(copy));
+      return;
+    }
+  };
+  for (const auto& edge : panel.outline) add_run(edge.name);
+  for (const auto& hole : panel.holes) {
+    for (const auto& edge : hole.edges) add_run(edge.name);
+  }
+  for (const auto& line : panel.lines) {
+    if (std::find(settings.lines.begin(), settings.lines.end(), line.name) != settings.lines.end()) add_run(line.name);
+  }
+  for (bool mirrored : {false, true}) {
+    for (int v = 0; v < count; ++v) id(v, mirrored);
+  }
+  result.uv.resize(next, 2);
+  for (int v = 0; v < count; ++v) {
+    Eigen::RowVector2d at = mesh.uv.row(v);
+    if (on_fold[static_cast<std::size_t>(v)]) at[half.axis] = half.at;
+    result.uv.row(id(v, false)) = at;
+    if (on_fold[static_cast<std::size_t>(v)]) continue;
+    at[half.axis] = 2 * half.at - at[half.axis];
+    result.uv.row(id(v, true)) = at;
+  }
+  std::vector<Triple> faces;
+  for (bool mirrored : {false, true}) {
+    for (Eigen::Index f = 0; f < mesh.faces.rows(); ++f) {
+      Triple face{id(mesh.faces(f, 0), mirrored), id(mesh.faces(f, 1), mirrored), id(mesh.faces(f, 2), mirrored)};
+      if (mirrored) std::swap(face[1], face[2]);
+      std::rotate(face.begin(), std::min_element(face.begin(), face.end()), face.end());
+      faces.push_back(face);
+    }
+  }
+  std::sort(faces.begin(), faces.end());
+  result.faces.resize(static_cast<Eigen::Index>(faces.size()), 3);
+  for (std::size_t f = 0; f < faces.size(); ++f) result.faces.row(static_cast<Eigen::Index>(f)) << faces[f][0], faces[f][1], faces[f][2];
+  for (const GridPoint& point : mesh.points) {
+    result.points.push_back({point.name, id(point.vertex, false)});
+    const auto other = half.other_point.find(point.name);
+    if (other != half.other_point.end()) result.points.push_back({other->second, id(point.vertex, true)});
+  }
+  std::sort(result.points.begin(), result.points.end(), [](const auto& a, const auto& b) { return a.name < b.name; });
+  return result;
+}
+
+}  // namespace
+
+Result<PanelMesh> mesh_panel(const pattern::CutPanel& panel, const GridSettings& settings) {
+  // An unfolded panel is meshed as half of it, so that it is symmetric to the last bit. Internal lines that are asked for
+  // must be asked for on both halves; a single direction of diagonals cannot be symmetric.
+  const auto half = settings.alternating ? half_of(panel) : std::nullopt;
+  bool symmetric = half.has_value();
+  if (half) {
+    const auto asked = [&](const std::string& name) { return std::find(settings.lines.begin(), settings.lines.end(), name) != settings.lines.end(); };
+    for (const auto& [here, there] : half->other_line) symmetric = symmetric && asked(here) == asked(there);
+  }
+  if (!symmetric) return mesh_whole(panel, settings, panel.fold);
+  auto mesh = mesh_whole(half->panel, settings, panel.fold);
+  if (!mesh) return mesh_whole(panel, settings, panel.fold);
+  return unfolded(*mesh, *half, panel, settings);
 }
 
 PanelMesh mirrored(const PanelMesh& mesh) {

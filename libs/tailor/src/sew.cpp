@@ -178,6 +178,8 @@ class Table {
     for (const Way& way : ways_) steps = std::max(steps, static_cast<int>(std::ceil(4 * std::abs(way.to - way.from) / reference(way.run))));
     ImproveOptions options;
     options.may_split_border = false;
+    for (const Way& way : ways_) options.around.push_back(way.vertex);
+    if (options.around.empty()) return;
     for (int step = 1; step <= steps; ++step) {
       for (const Way& way : ways_) {
         const double s = step == steps ? way.to : way.from + (way.to - way.from) * step / steps;
