@@ -12,7 +12,7 @@ struct DiffStage {
   static stage::Description description() {
     return {.name = "toile-diff",
             .version = 1,
-            .summary = "Compares two garments or two supports: structure, numbers, meaning.",
+            .summary = "Compares two garments, supports, JSON files or pictures: structure, numbers, meaning.",
             .example = "toile-diff expected.ply draped.ply --mode indexed",
             .details = "Exit code 0: the same within the tolerances; 4: different. The largest change of every column is printed either way. "
                        "Files of other kinds are compared byte by byte.",
@@ -37,6 +37,16 @@ struct DiffStage {
       report = inspect::diff(params, *p, *q);
     } else if (kind == inspect::Artefact::support) {
       const auto p = run.support("a"), q = run.support("b");
+      Issues issues = p.issues();
+      append(issues, q.issues());
+      if (!issues.empty()) return issues;
+      report = inspect::diff(params, *p, *q);
+    } else if (kind == inspect::Artefact::json) {
+      auto compared = inspect::diff_json(params, *a, *b);
+      if (!compared) return compared.issues();
+      report = std::move(*compared);
+    } else if (kind == inspect::Artefact::png && *a != *b) {
+      const auto p = inspect::decode_png(*a, run.path("a")), q = inspect::decode_png(*b, run.path("b"));
       Issues issues = p.issues();
       append(issues, q.issues());
       if (!issues.empty()) return issues;

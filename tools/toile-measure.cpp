@@ -16,9 +16,9 @@ struct Params {
     f(&Params::girths, {.key = "girths", .doc = "where the tape is laid round; empty: at chest, bust, waist, hip and seat, as far as the support has them and the garment reaches"});
     f(&Params::lengths, {.key = "lengths", .doc = "finished lengths to report"});
     f(&Params::checks, {.key = "checks", .doc = "conditions for exit code 0; those not named are not checked"});
-    f(&Params::panels_csv, {.key = "panels_csv", .doc = "file for the table of panels; empty: none"});
-    f(&Params::seams_csv, {.key = "seams_csv", .doc = "file for the table of seams; empty: none"});
-    f(&Params::map, {.key = "map", .doc = "garment file with strain, tension and ease as columns; empty: none"});
+    f(&Params::panels_csv, {.key = "panels_csv", .doc = "file for the table of panels; empty: none", .local = true});
+    f(&Params::seams_csv, {.key = "seams_csv", .doc = "file for the table of seams; empty: none", .local = true});
+    f(&Params::map, {.key = "map", .doc = "garment file with strain, tension and ease as columns; empty: none", .local = true});
   }
 };
 
@@ -69,7 +69,7 @@ struct MeasureStage {
     run.report("max_strain_warp", figures->warp.max);
     run.report("max_strain_weft", figures->weft.max);
     if (figures->support) run.report("penetrating_vertices", figures->support->penetrating_vertices);
-    run.report("self_intersections", figures->self_intersections);
+    run.report("self_intersections", figures->self_intersections.value_or(0));
     run.report("max_seam_gap", figures->max_seam_gap, "m");
     run.report("mass", figures->mass, "kg");
     return output;

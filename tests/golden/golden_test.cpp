@@ -100,7 +100,8 @@ TEST_P(golden, program_gives_what_is_expected) {
     return;
   }
   ASSERT_TRUE(fs::exists(expected)) << "make it with TOILE_UPDATE_GOLDEN=1";
-  if (extension == ".ply") {
+  // Numbers and pictures may differ in their last places between processors.
+  if (extension == ".ply" || extension == ".json" || extension == ".png") {
     EXPECT_EQ(std::system(diff.c_str()), 0) << diff;
   } else {
     EXPECT_EQ(first, *io::read_file(expected));

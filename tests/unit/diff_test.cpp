@@ -235,5 +235,44 @@ TEST(Diff, of_supports) {
   EXPECT_FALSE(diff(params, a, finer).same());
 }
 
+TEST(Diff, of_json) {
+  const std::string a = R"({"name": "tee", "mass": 0.085, "noise": 1e-17, "list": [1, 2, {"x": null}]})";
+  const auto differences = [&](const std::string& b, DiffMode mode = DiffMode::indexed) {
+    DiffParams params;
+    params.mode = mode;
+    return diff_json(params, a, b)->differences.size();
+  };
+  EXPECT_EQ(differences(a), 0u);
+  EXPECT_EQ(differences(R"({"mass": 0.08500000001, "name": "tee", "noise": 0, "list": [1, 2, {"x": null}]})"), 0u);
+  EXPECT_EQ(differences(R"({"mass": 0.08500000001, "name": "tee", "noise": 1e-17, "list": [1, 2, {"x": null}]})", DiffMode::exact), 1u);
+  EXPECT_EQ(differences(R"({"name": "tee", "mass": 0.0851, "noise": 1e-17, "list": [1, 2, {"x": null}]})"), 1u);
+  EXPECT_EQ(differences(R"({"name": "tea", "mass": 0.085, "noise": 1e-17, "list": [1, 2, {"x": 0}]})"), 2u);
+  EXPECT_EQ(differences(R"({"name": "tee", "mass": 0.085, "noise": 1e-17, "list": [1, 2]})"), 1u);
+  EXPECT_EQ(differences(R"({"name": "tee", "mass": "0.085", "list": [1, 2, {"x": null}], "more": 1})"), 3u);
+  EXPECT_EQ(diff_json({}, a, "{").issues().at(0).code, "bad_json");
+}
+
+TEST(Diff, of_pictures) {
+  Image a(50, 40);
+  for (std::size_t i = 0; i < a.rgb.size(); ++i) a.rgb[i] = static_cast<std::uint8_t>(i % 251);
+  const auto same = [&](const Image& b, DiffMode mode = DiffMode::indexed) {
+    DiffParams params;
+    params.mode = mode;
+    return diff(params, a, b).same();
+  };
+  EXPECT_TRUE(same(a));
+  auto speck = a;
+  speck.pixel(7, 9)[1] ^= 0x40;
+  EXPECT_TRUE(same(speck));
+  EXPECT_FALSE(same(speck, DiffMode::exact));
+  auto line = a;
+  for (int x = 0; x < 50; ++x) line.pixel(x, 20)[0] = static_cast<std::uint8_t>(line.pixel(x, 20)[0] ^ 0x80);
+  EXPECT_FALSE(same(line));
+  auto darker = a;
+  for (auto& v : darker.rgb) v = static_cast<std::uint8_t>(v > 1 ? v - 2 : v);
+  EXPECT_FALSE(same(darker));
+  EXPECT_FALSE(same(Image(40, 50)));
+}
+
 }  // namespace
 }  // namespace toile::inspect

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <nlohmann/json.hpp>
 #include <numbers>
 #include <set>
 
@@ -380,6 +381,66 @@ DiffReport diff(const DiffParams& params, const mesh::SupportMesh& a, const mesh
   });
   keyed("girth", a.girths, b.girths, [&](const std::string& item, double p, double q) { c.band(item + " [m]", p, q, point_band, false); });
   if (params.mode != DiffMode::exact) c.band("volume [m3]", mesh::volume(a.x, a.faces), mesh::volume(b.x, b.faces), params.area_band, true);
+  return std::move(c.report);
+}
+
+namespace {
+
+void compare_json(DiffReport& report, DiffMode mode, const nlohmann::ordered_json& a, const nlohmann::ordered_json& b, const std::string& path) {
+  const auto differ = [&](DiffLayer layer, std::string what) { report.differences.push_back({layer, path.empty() ? "file" : path, std::move(what)}); };
+  if (a.is_number() && b.is_number()) {
+    const double x = a.get<double>(), y = b.get<double>();
+    // A figure that is zero but for rounding has no size of its own.
+    const bool same = mode == DiffMode::exact ? same_bits(x, y) : std::abs(x - y) <= 1e-12 + 1e-6 * std::max(std::abs(x), std::abs(y));
+    if (!same) differ(DiffLayer::numbers, fmt::format("{} here, {} there", format_number(x), format_number(y)));
+    return;
+  }
+  if (a.type() != b.type()) return differ(DiffLayer::structure, fmt::format("{} here, {} there", a.dump(), b.dump()));
+  if (a.is_object()) {
+    for (const auto& [key, value] : a.items()) {
+      const std::string below = path.empty() ? key : path + "." + key;
+      if (b.contains(key)) compare_json(report, mode, value, b[key], below);
+      else report.differences.push_back({DiffLayer::structure, below, "it is only here"});
+    }
+    for (const auto& [key, value] : b.items()) {
+      if (!a.contains(key)) report.differences.push_back({DiffLayer::structure, path.empty() ? key : path + "." + key, "it is only there"});
+    }
+  } else if (a.is_array()) {
+    if (a.size() != b.size()) return differ(DiffLayer::structure, fmt::format("{} items here, {} there", a.size(), b.size()));
+    for (std::size_t i = 0; i < a.size(); ++i) compare_json(report, mode, a[i], b[i], fmt::format("{}[{}]", path, i));
+  } else if (a != b) {
+    differ(DiffLayer::structure, fmt::format("{} here, {} there", a.dump(), b.dump()));
+  }
+}
+
+}  // namespace
+
+Result<DiffReport> diff_json(const DiffParams& params, const std::string& a, const std::string& b) {
+  const auto p = nlohmann::ordered_json::parse(a, nullptr, false), q = nlohmann::ordered_json::parse(b, nullptr, false);
+  if (p.is_discarded() || q.is_discarded()) return Issue{"bad_json", {}, "one of the files is not valid JSON", "make it again"};
+  DiffReport report;
+  compare_json(report, params.mode, p, q, "");
+  return report;
+}
+
+DiffReport diff(const DiffParams& params, const Image& a, const Image& b) {
+  Comparison c(params);
+  if (!c.count("width", static_cast<std::size_t>(a.width), static_cast<std::size_t>(b.width)) || !c.count("height", static_cast<std::size_t>(a.height), static_cast<std::size_t>(b.height))) return std::move(c.report);
+  double sum = 0;
+  std::size_t far = 0;
+  for (std::size_t i = 0; i < a.rgb.size(); i += 3) {
+    int most = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const int d = std::abs(a.rgb[i + k] - b.rgb[i + k]);
+      most = std::max(most, d);
+      sum += d;
+    }
+    if (most > 16) ++far;
+  }
+  const bool exact = params.mode == DiffMode::exact;
+  const double pixels = std::max<double>(1, static_cast<double>(a.rgb.size()) / 3);
+  c.band("mean difference of 255", sum / (3 * pixels), 0, exact ? 0 : 0.5, false);
+  c.band("part of pixels that differ by more than 16", static_cast<double>(far) / pixels, 0, exact ? 0 : 0.01, false);
   return std::move(c.report);
 }
 

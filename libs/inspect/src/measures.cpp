@@ -197,7 +197,7 @@ std::vector<double> signed_distances(const mesh::Points3& points, const contact:
   return result;
 }
 
-SupportFigures support_figures(const mesh::GarmentMesh& g, const contact::Surface& cloth, const mesh::SupportMesh& support) {
+SupportFigures support_figures(const mesh::GarmentMesh& g, const contact::Surface& cloth, const mesh::SupportMesh& support, Depth depth) {
   SupportFigures result;
   const contact::Surface surface = contact::make_surface(static_cast<int>(support.x.rows()), support.faces);
   result.vertex_ease = signed_distances(g.x, contact::SupportField(surface, support.x));
@@ -208,6 +208,7 @@ SupportFigures support_figures(const mesh::GarmentMesh& g, const contact::Surfac
   }
   if (!result.vertex_ease.empty()) result.mean_ease /= static_cast<double>(result.vertex_ease.size());
   result.ease = spread(result.vertex_ease);
+  if (depth == Depth::quick) return result;
   std::set<int> cutting;
   for (const contact::FacePair& pair : contact::support_intersections(cloth, g.x, surface, support.x)) cutting.insert(pair.a);
   result.support_intersections = cutting.size();
@@ -302,7 +303,7 @@ SewnSurface sewn_surface(const mesh::GarmentMesh& g) {
   return sewn;
 }
 
-Result<Figures> measure(const MeasureParams& params, const mesh::GarmentMesh& g, const mesh::SupportMesh* support) {
+Result<Figures> measure(const MeasureParams& params, const mesh::GarmentMesh& g, const mesh::SupportMesh* support, Depth depth) {
   Issues issues;
   Figures r;
   if (const auto it = g.marks.find("converged"); it != g.marks.end()) r.converged = it->second == "yes" || it->second == "true";
@@ -328,14 +329,14 @@ Result<Figures> measure(const MeasureParams& params, const mesh::GarmentMesh& g,
   }
 
   const contact::Surface cloth = contact::make_surface(static_cast<int>(g.vertex_count()), g.faces, sewn.particle);
-  {
+  if (depth == Depth::full) {
     std::set<int> faces;
     const auto pairs = contact::self_intersections(cloth, g.x);
     for (const contact::FacePair& pair : pairs) faces.insert({pair.a, pair.b});
     r.self_intersections = pairs.size();
     r.self_intersecting_faces = faces.size();
   }
-  if (support != nullptr) r.support = support_figures(g, cloth, *support);
+  if (support != nullptr) r.support = support_figures(g, cloth, *support, depth);
 
   std::vector<std::vector<Eigen::Index>> faces_of(g.panels.size());
   for (Eigen::Index f = 0; f < g.face_count(); ++f) {
@@ -503,11 +504,11 @@ Issues failed_checks(const Checks& checks, const Figures& r, const mesh::Garment
   }
   const auto count_check = [&](const char* code, const std::optional<int>& limit, std::optional<std::size_t> count, const char* what, const char* remedy) {
     if (!limit) return;
-    if (!count) fail(code, "checks", fmt::format("{} cannot be counted without a support", what), "add --support FILE");
+    if (!count) fail(code, "checks", fmt::format("{}: cannot be counted without a support", what), "add --support FILE");
     else if (*count > static_cast<std::size_t>(*limit)) fail(code, "garment", fmt::format("{} {}; {} allowed", *count, what, *limit), remedy);
   };
   count_check("penetrating_vertices", checks.penetrating_vertices, r.support ? std::optional(r.support->penetrating_vertices) : std::nullopt, "vertices are inside the support", "simulate longer, or place the garment clear of the body");
-  count_check("support_intersections", checks.support_intersections, r.support ? std::optional(r.support->support_intersections) : std::nullopt, "faces cut the support", "use a finer grid or a smoother support");
+  count_check("support_intersections", checks.support_intersections, r.support ? r.support->support_intersections : std::nullopt, "faces cut the support", "use a finer grid or a smoother support");
   count_check("self_intersections", checks.self_intersections, r.self_intersections, "pairs of faces cut each other", "place the panels clear of one another");
   for (const SeamFigures& s : r.seams) {
     if (checks.max_seam_gap && s.max_gap > *checks.max_seam_gap) {

@@ -18,6 +18,15 @@ void add_row(std::string& out, const char* key, const Row& row) {
   out += '\n';
 }
 
+/// Six digits are more than shading can use, and the same on every processor.
+void add_normals(std::string& out, const mesh::Points3& normals) {
+  for (Eigen::Index v = 0; v < normals.rows(); ++v) {
+    out += "vn";
+    for (int k = 0; k < 3; ++k) out += fmt::format(" {:.6g}", std::abs(normals(v, k)) < 5e-7 ? 0.0 : normals(v, k));
+    out += '\n';
+  }
+}
+
 }  // namespace
 
 mesh::Points3 export_normals(const mesh::Points3& x, const mesh::Triangles& faces) {
@@ -67,7 +76,7 @@ std::string format_obj(const mesh::GarmentMesh& g, SeamPoints seams) {
   const mesh::Points3 normals = export_normals(x, faces);
   for (Eigen::Index v = 0; v < x.rows(); ++v) add_row(out, "v", x.row(v));
   for (Eigen::Index v = 0; v < g.vertex_count(); ++v) add_row(out, "vt", g.uv.row(v));
-  for (Eigen::Index v = 0; v < x.rows(); ++v) add_row(out, "vn", normals.row(v));
+  add_normals(out, normals);
   for (const mesh::Panel& panel : g.panels) {
     out += "g " + one_word(panel.name) + '\n';
     for (Eigen::Index f = 0; f < g.face_count(); ++f) {
@@ -84,7 +93,7 @@ std::string format_obj(const mesh::SupportMesh& s) {
   std::string out = "# Toile support; metres, y up\n";
   const mesh::Points3 normals = export_normals(s.x, s.faces);
   for (Eigen::Index v = 0; v < s.x.rows(); ++v) add_row(out, "v", s.x.row(v));
-  for (Eigen::Index v = 0; v < s.x.rows(); ++v) add_row(out, "vn", normals.row(v));
+  add_normals(out, normals);
   for (int region = -1; region < static_cast<int>(s.region_names.size()); ++region) {
     bool titled = false;
     for (Eigen::Index f = 0; f < s.faces.rows(); ++f) {

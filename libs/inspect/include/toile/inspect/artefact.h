@@ -4,7 +4,7 @@
 
 namespace toile::inspect {
 
-enum class Artefact { garment, support, other };
+enum class Artefact { garment, support, json, png, other };
 
 /// What a file is, from its first lines.
 Artefact artefact_kind(std::string_view bytes);

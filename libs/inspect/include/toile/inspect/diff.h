@@ -2,6 +2,7 @@
 #pragma once
 
 #include "toile/base/fields.h"
+#include "toile/inspect/image.h"
 #include "toile/inspect/json.h"
 #include "toile/mesh/garment_mesh.h"
 #include "toile/mesh/support_mesh.h"
@@ -72,6 +73,13 @@ struct DiffReport {
 
 DiffReport diff(const DiffParams& params, const mesh::GarmentMesh& a, const mesh::GarmentMesh& b);
 DiffReport diff(const DiffParams& params, const mesh::SupportMesh& a, const mesh::SupportMesh& b);
+
+/// JSON texts: keys and words exactly, numbers within 1e-6 of their size (exact mode: to the last bit).
+/// error  Issue "bad_json"
+Result<DiffReport> diff_json(const DiffParams& params, const std::string& a, const std::string& b);
+/// Pictures: the same size; at most 1 % of the pixels differ by more than 16 of 255 in a channel, and the mean difference is at
+/// most 0.5 of 255 (processors differ in the last bits of rays, and so in single pixels). Exact mode: every byte.
+DiffReport diff(const DiffParams& params, const Image& a, const Image& b);
 
 /// Greatest distance from a vertex of either mesh to the other's surface [m].
 double surface_distance(const mesh::Points3& xa, const mesh::Triangles& fa, const mesh::Points3& xb, const mesh::Triangles& fb);

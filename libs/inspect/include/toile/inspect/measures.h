@@ -142,7 +142,7 @@ struct LengthFigures {
 struct SupportFigures {
   std::size_t penetrating_vertices = 0;
   double max_penetration = 0;            ///< [m]
-  std::size_t support_intersections = 0; ///< faces that cut the support's surface
+  std::optional<std::size_t> support_intersections; ///< faces that cut the support's surface; none: not searched
   Spread ease;                           ///< signed distance of vertices to the support [m]
   double mean_ease = 0;
   std::vector<double> vertex_ease;       ///< |V| [m]
@@ -163,7 +163,7 @@ struct Figures {
   double min_angle = 0;                               ///< [rad]
   std::size_t unassigned_faces = 0;                   ///< without a laminate: they weigh nothing
   Eigen::Vector3d centre_of_mass = Eigen::Vector3d::Zero(), low = Eigen::Vector3d::Zero(), high = Eigen::Vector3d::Zero();
-  std::size_t self_intersections = 0, self_intersecting_faces = 0;
+  std::optional<std::size_t> self_intersections, self_intersecting_faces;  ///< none: not searched
   std::optional<SupportFigures> support;
   std::vector<PanelFigures> panels;
   std::vector<SeamFigures> seams;
@@ -177,9 +177,14 @@ struct Figures {
 std::vector<PanelFigures> panel_table(const mesh::GarmentMesh& garment, const FaceStrain& strain);
 std::vector<SeamFigures> seam_table(const mesh::GarmentMesh& garment);
 
+enum class Depth {
+  full,
+  quick,  ///< no search for intersections
+};
+
 /// All figures. `support` may be null: then nothing is said about it.
 /// error  Issue "unknown_landmark", "unknown_panel", "unknown_run", "unknown_point", "needs_support", naming the request
-Result<Figures> measure(const MeasureParams& params, const mesh::GarmentMesh& garment, const mesh::SupportMesh* support);
+Result<Figures> measure(const MeasureParams& params, const mesh::GarmentMesh& garment, const mesh::SupportMesh* support, Depth depth = Depth::full);
 
 /// The violated checks, each an issue of Category::check.
 Issues failed_checks(const Checks& checks, const Figures& figures, const mesh::GarmentMesh& garment);
