@@ -92,7 +92,7 @@ TEST_F(Picture, a_ball_fills_the_frame_as_a_disc_of_the_right_size) {
   EXPECT_NEAR(right - left + 1, 182, 2);
   EXPECT_NEAR(left, 9, 2);
   EXPECT_NEAR(covered, 3.14159 * 91 * 91, 0.02 * 26000);
-  EXPECT_NEAR(background, 241, 1);
+  EXPECT_NEAR(background, 255 * params.background[0], 1);
 }
 
 TEST_F(Picture, the_same_at_any_number_of_threads) {

@@ -100,7 +100,7 @@ Vector3f shoulder(Vector3f c) {
 Vector3f lit(Kind kind, bool data, const Vector3f& albedo, const Vector3f& light, const Vector3f& glow) {
   if (kind == Kind::empty || kind == Kind::ground) return albedo.cwiseProduct(light);
   if (data) {
-    const float gray = (light.x() + light.y() + light.z()) / 3 / 1.2f;
+    const float gray = (light.x() + light.y() + light.z()) / 3 / 0.95f;
     return albedo * (0.42f + 0.58f * std::min(gray, 1.0f));
   }
   return shoulder(albedo.cwiseProduct(light) + glow);
@@ -114,7 +114,7 @@ class Tracer {
     // The key light stands high on the viewer's left whatever the view.
     const Vector3f level = Vector3f(toward_.x(), 0, toward_.z()).norm() > 0.05f ? Vector3f(toward_.x(), 0, toward_.z()).normalized() : Vector3f(0, 0, 1);
     const Vector3f right = scene.camera.right.cast<float>();
-    key_ = (0.62f * level - 0.62f * right + Vector3f(0, 0.78f, 0)).normalized();
+    key_ = (0.50f * level - 0.72f * right + Vector3f(0, 0.72f, 0)).normalized();
     low_ = Vector3f::Constant(1e30f);
     high_ = -low_;
     for (const Surface& surface : scene.surfaces) {
@@ -173,9 +173,9 @@ class Tracer {
 
   /// What comes from the surroundings: a bright ceiling, a wall behind the camera, a floor that gives some back.
   Vector3f surroundings(const Vector3f& d) const {
-    const float sky = 0.46f + 0.42f * std::clamp(0.5f + 0.7f * d.y(), 0.0f, 1.0f);
-    const float wall = 0.20f * std::max(0.0f, d.dot(toward_));
-    const float value = d.y() > 0 ? sky + wall : std::max(0.38f, sky) * 0.92f + 0.7f * wall;
+    const float sky = 0.32f + 0.40f * std::clamp(0.5f + 0.7f * d.y(), 0.0f, 1.0f);
+    const float wall = 0.14f * std::max(0.0f, d.dot(toward_));
+    const float value = d.y() > 0 ? sky + wall : std::max(0.27f, sky) * 0.92f + 0.7f * wall;
     return value * Vector3f(0.975f, 0.99f, 1.0f);
   }
 
@@ -322,7 +322,7 @@ class Tracer {
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     rtcOccluded8(valid, embree_, &context, &rays);
-    const Vector3f key_color(0.80f, 0.785f, 0.76f);
+    const Vector3f key_color(0.72f, 0.707f, 0.685f);
     Vector3f seen = Vector3f::Zero(), open = Vector3f::Zero();
     for (int k = 0; k < packet; ++k) {
       const bool free = rays.tfar[k] > 0;

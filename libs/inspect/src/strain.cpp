@@ -1,6 +1,7 @@
 #include "toile/inspect/strain.h"
 
 #include "toile/base/parallel.h"
+#include "toile/fabric/constitutive.h"
 
 #include <algorithm>
 #include <cmath>
@@ -35,33 +36,11 @@ FaceStrain face_strain(const mesh::GarmentMesh& g) {
   return s;
 }
 
-namespace {
-
-/// F = a (exp(b e) - 1) through (EMT, F_max) with linearity LT; below zero the line of the initial slope.
-struct TensileCurve {
-  double a = 0, b = 0;
-
-  TensileCurve(const fabric::YarnDirection& yarn, double force_max) {
-    // LT = 2 (1/x - 1/(e^x - 1)), x = b EMT, falls from 1 at x = 0: bisection.
-    const double lt = std::min(yarn.linearity, 0.9999);
-    double low = 1e-4, high = 60;
-    for (int i = 0; i < 80; ++i) {
-      const double x = 0.5 * (low + high);
-      (2 * (1 / x - 1 / std::expm1(x)) > lt ? low : high) = x;
-    }
-    b = low / yarn.strain_max;
-    a = force_max / std::expm1(low);
-  }
-  double force(double strain) const { return strain > 0 ? a * std::expm1(b * strain) : a * b * strain; }
-};
-
-}  // namespace
-
 FaceTension face_tension(const mesh::GarmentMesh& g, const FaceStrain& strain) {
-  std::vector<std::pair<TensileCurve, TensileCurve>> curves;
+  std::vector<std::pair<fabric::TensileCurve, fabric::TensileCurve>> curves;
   for (const auto& laminate : g.laminates) {
     const fabric::Card& card = laminate.equivalent;
-    curves.emplace_back(TensileCurve(card.warp, card.tensile_force_max), TensileCurve(card.weft, card.tensile_force_max));
+    curves.emplace_back(fabric::tensile_curve(card.tensile_force_max, card.warp.strain_max, card.warp.linearity), fabric::tensile_curve(card.tensile_force_max, card.weft.strain_max, card.weft.linearity));
   }
   FaceTension t;
   t.warp = t.weft = Eigen::VectorXd::Zero(g.face_count());
@@ -69,8 +48,8 @@ FaceTension face_tension(const mesh::GarmentMesh& g, const FaceStrain& strain) {
     const int laminate = g.face_laminate[f];
     if (laminate < 0) continue;
     const auto& [warp, weft] = curves[static_cast<std::size_t>(laminate)];
-    t.warp[f] = warp.force(strain.warp[f]);
-    t.weft[f] = weft.force(strain.weft[f]);
+    t.warp[f] = warp.at(strain.warp[f]).force;
+    t.weft[f] = weft.at(strain.weft[f]).force;
   }
   return t;
 }

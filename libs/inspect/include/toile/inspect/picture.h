@@ -31,7 +31,7 @@ struct PictureParams {
   double zoom = 1;
   std::string size = "900x1200";
   int samples = 4;
-  std::array<double, 3> background{0.945, 0.945, 0.94};
+  std::array<double, 3> background{0.90, 0.90, 0.895};
   std::array<double, 3> support_color{0.77, 0.71, 0.65};
   static void describe(auto& f) {
     f(&PictureParams::view, {.key = "view", .doc = "where the camera stands; side is left (the wearer's); inside leaves out the near half of the cloth and the support; flat lays the panels out as cut"});
