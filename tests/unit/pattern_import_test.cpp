@@ -68,7 +68,7 @@ io::ImportParams params(const std::string& yaml) {
 const std::string good_spec = with(spec, "    tolerance_note: x\n", "");
 
 Result<io::ImportedPattern> import(const std::string& yaml, const std::string& json = draft) {
-  return io::import_freesewing(json, "draft.json", params(yaml));
+  return io::import_pattern(json, "draft.json", params(yaml));
 }
 
 std::string sample_file(const std::string& name) {
@@ -253,11 +253,84 @@ TEST(ImportFreesewing, broken_drafts) {
   EXPECT_EQ(imported.issues().front().place.line, 2);
 }
 
+namespace {
+
+/// Two halves of a tube, one drawn from behind, with one edge of each kind; cm, y up.
+const char* const garmentcode = R"({
+ "pattern": {
+  "panels": {
+   "front": {"translation": [0,0,20], "rotation": [0,0,0], "vertices": [[0,0],[30,0],[30,40],[0,40]],
+    "edges": [{"endpoints": [0,1], "curvature": {"type": "circle", "params": [25, 0, 1]}}, {"endpoints": [1,2]},
+              {"endpoints": [2,3], "curvature": {"type": "quadratic", "params": [[0.5, 0.1]]}}, {"endpoints": [3,0]}]},
+   "back": {"translation": [0,0,-20], "rotation": [0,0,0], "vertices": [[0,0],[0,40],[30,42],[30,0]],
+    "edges": [{"endpoints": [0,1]}, {"endpoints": [1,2], "curvature": {"type": "cubic", "params": [[0.3, -0.1], [0.7, -0.1]]}},
+              {"endpoints": [2,3]}, {"endpoints": [3,0], "curvature": [0.5, 0.05]}]}
+  },
+  "stitches": [[{"panel": "front", "edge": 1}, {"panel": "back", "edge": 2}], [{"panel": "front", "edge": 3}, {"panel": "back", "edge": 0}, "right_wrong"]],
+  "panel_order": ["front", "back"]
+ },
+ "properties": {"curvature_coords": "relative", "units_in_meter": 100}
+})";
+
+}  // namespace
+
+TEST(ImportGarmentCode, panels_with_their_face_up) {
+  const auto imported = import("{}", garmentcode);
+  ASSERT_TRUE(imported) << to_string(imported.issues().front());
+  const Pattern& pattern = imported->pattern;
+  EXPECT_FALSE(pattern.y_down);
+  ASSERT_EQ(pattern.pieces.size(), 2u);
+  const Piece &front = pattern.pieces[0], &back = pattern.pieces[1];
+  EXPECT_EQ(front.points.at("v2"), Point2(300, 400));
+  EXPECT_EQ(front.outline[0].name, "e0");
+  // The arc lies on the right of its edge, that is below: it is 25 - sqrt(25^2 - 15^2) = 5 cm deep.
+  EXPECT_NEAR((position(front.outline[0].segments[0], 0.5) - Point2(150, -50)).norm(), 0, 1e-6);
+  EXPECT_EQ(front.outline[2].segments[0], quadratic_segment({300, 400}, {150, 370}, {0, 400}));
+  // The back is drawn clockwise, as seen from inside the garment: it is turned over.
+  EXPECT_EQ(back.points.at("v2"), Point2(-300, 420));
+  const auto panels = cut_panels(pattern);
+  ASSERT_TRUE(panels);
+  for (const CutPanel& panel : *panels) EXPECT_EQ(panel.outline[0].from, "v0");
+  // A missing grain line is told.
+  EXPECT_EQ(imported->notes.size(), 2u);
+  EXPECT_EQ(imported->seams,
+            "seams:\n  - {name: s1, a: [front.e1], b: [\"-back.e2\"], ease: 20 mm}\n"
+            "  - {name: s2, a: [front.e3], b: [\"back.e0\"]}\n");
+}
+
+TEST(ImportGarmentCode, a_spec_names_edges_and_loses_no_stitch_in_silence) {
+  const auto imported = import("pieces: [{name: f, part: front, grain: y, edges: {left: v1>v2}}, {name: b, part: back, grain: x}]", garmentcode);
+  ASSERT_TRUE(imported) << to_string(imported.issues().front());
+  EXPECT_NE(imported->seams.find("a: [f.left], b: [\"-b.e2\"]"), std::string::npos);
+  const auto half = import("pieces: [{name: f, part: front, grain: y}]", garmentcode);
+  ASSERT_TRUE(half);
+  EXPECT_EQ(half->notes.size(), 2u);
+  EXPECT_EQ(half->notes[0].code, "stitch_left_out");
+}
+
+TEST(ImportGarmentCode, broken_specifications) {
+  const auto fails = [](const std::string& part, const std::string& by) {
+    const std::string json = with(garmentcode, part, by);
+    if (json.empty()) return false;
+    const auto imported = import("{}", json);
+    return !imported && imported.issues().front().code == "bad_draft";
+  };
+  EXPECT_TRUE(fails("[30,40]", "[30]"));
+  EXPECT_TRUE(fails("\"endpoints\": [1,2]}", "\"endpoints\": [1,9]}"));
+  EXPECT_TRUE(fails("\"endpoints\": [1,2]}", "\"endpoints\": [0,2]}"));
+  EXPECT_TRUE(fails("[25, 0, 1]", "[5, 0, 1]"));
+  EXPECT_TRUE(fails("\"circle\"", "\"spiral\""));
+  EXPECT_TRUE(fails("\"edge\": 1}", "\"edge\": 7}"));
+  EXPECT_TRUE(fails("\"panel\": \"back\"", "\"panel\": \"bakc\""));
+  EXPECT_TRUE(fails("\"relative\"", "\"absolute\""));
+  EXPECT_TRUE(fails("\"units_in_meter\": 100", "\"units_in_meter\": 0"));
+}
+
 TEST(SamplePatterns, are_what_the_import_makes_of_the_drafts) {
   for (const auto& [design, name] : {std::pair{"teagan", "tee"}, std::pair{"penelope", "skirt"}}) {
     const std::string folder = "patterns/freesewing/";
     const auto p = params(sample_file(folder + name + ".yaml"));
-    const auto imported = io::import_freesewing(sample_file(folder + design + ".json"), design, p);
+    const auto imported = io::import_pattern(sample_file(folder + design + ".json"), design, p);
     ASSERT_TRUE(imported) << to_string(imported.issues().front());
     EXPECT_TRUE(imported->notes.empty());
     EXPECT_EQ(io::format_pattern(imported->pattern), sample_file("patterns/" + std::string(name) + ".yaml"));

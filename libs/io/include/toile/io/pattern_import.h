@@ -99,7 +99,8 @@ struct ImportPiece {
     f(&ImportPiece::edges,
       {.key = "edges", .doc = "edges of the outline: name -> run of points a>b>c; others are named by their ends"});
     f(&ImportPiece::shortcuts,
-      {.key = "shortcuts", .doc = "runs a>b>c of straight lines that replace the outline from a to c, in its direction"});
+      {.key = "shortcuts",
+       .doc = "runs a>b>c of straight lines that replace the outline from a to c, in its direction"});
     f(&ImportPiece::splits, {.key = "splits", .doc = "cuts of edges where no point is"});
     f(&ImportPiece::holes, {.key = "holes", .doc = "closed paths cut out, by name"});
     f(&ImportPiece::lines, {.key = "lines", .doc = "internal lines, by name"});
@@ -110,13 +111,15 @@ struct ImportPiece {
 };
 
 struct ImportParams {
-  std::string name, origin;
+  std::string name, origin, seams;
   double tolerance = 1e-4;
   std::vector<ImportPiece> pieces;
   static void describe(auto& f) {
     f(&ImportParams::name, {.key = "name", .doc = "name of the pattern; without it the design's"});
     f(&ImportParams::origin,
       {.key = "origin", .doc = "where the pattern comes from and its licence; without it the program and design"});
+    f(&ImportParams::seams,
+      {.key = "seams", .doc = "file that gets the draft's stitches as a seam spec (GarmentCode)"});
     f(&ImportParams::tolerance, {.key = "tolerance",
                                  .doc = "distance within which a drafted point lies on a line",
                                  .unit = "m",
@@ -130,13 +133,16 @@ struct ImportParams {
 
 struct ImportedPattern {
   pattern::Pattern pattern;
-  Issues notes;  ///< things left out, for people to know
+  Issues notes;       ///< things left out or assumed, for people to know
+  std::string seams;  ///< the draft's stitches as a seam spec (YAML); empty if it has none
 };
 
-/// A FreeSewing draft as JSON (samples/patterns/freesewing/draft.mjs writes it). The result passes pattern::check.
-/// error  Issue "bad_json", "bad_draft", "unknown_part", "unknown_path", "unknown_point", "bad_run", "run_off_outline",
-///        "run_ambiguous", "edges_overlap", "no_fold_edge", those of split_edge and of pattern::check
-Result<ImportedPattern> import_freesewing(std::string_view json, const std::string& file, const ImportParams& params);
+/// A FreeSewing draft (samples/patterns/freesewing/draft.mjs writes it) or a GarmentCode specification, as JSON; which
+/// of them is seen from the file. The result passes pattern::check. error  Issue "bad_json", "bad_draft",
+/// "unknown_part", "unknown_path", "unknown_point", "unknown_material", "bad_run",
+///        "run_off_outline", "run_ambiguous", "edges_overlap", "no_fold_edge", "grain_missing", those of split_edge and
+///        of pattern::check
+Result<ImportedPattern> import_pattern(std::string_view json, const std::string& file, const ImportParams& params);
 
 }  // namespace toile::io
 
