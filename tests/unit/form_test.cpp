@@ -1,37 +1,25 @@
 #include "toile/form/form.h"
 
 #include "toile/geometry/slice.h"
-#include "toile/io/ply.h"
+#include "toile/io/record_yaml.h"
 #include "toile/mesh/topology.h"
 
 #include <gtest/gtest.h>
 
+#include "people.h"
+
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <map>
-#include <tuple>
+#include <functional>
+#include <set>
+#include <string>
 
 using namespace toile;
+using toile::testing_people::man;
+using toile::testing_people::woman;
 
 namespace {
-
-form::Measurements man() {
-  form::Measurements m;
-  m.chest = 1.0, m.waist = 0.783, m.hips = 0.928, m.seat = 0.977, m.neck = 0.4, m.biceps = 0.318, m.wrist = 0.165;
-  m.shoulderToShoulder = 0.43, m.shoulderSlope = 21 * M_PI / 180, m.hpsToWaistBack = 0.46, m.hpsToBust = 0.265;
-  m.waistToArmpit = 0.215, m.waistToHips = 0.13, m.waistToSeat = 0.22, m.waistToFloor = 1.085;
-  m.shoulderToElbow = 0.32, m.shoulderToWrist = 0.575, m.waistToUpperLeg = 0.27;
-  return m;
-}
-
-form::Measurements woman() {
-  form::Measurements m;
-  m.chest = 0.92, m.waist = 0.735, m.hips = 0.905, m.seat = 0.99, m.neck = 0.36, m.biceps = 0.283, m.wrist = 0.158;
-  m.shoulderToShoulder = 0.395, m.shoulderSlope = 19 * M_PI / 180, m.hpsToWaistBack = 0.42, m.hpsToBust = 0.265;
-  m.waistToArmpit = 0.21, m.waistToHips = 0.125, m.waistToSeat = 0.25, m.waistToFloor = 1.045;
-  m.shoulderToElbow = 0.33, m.shoulderToWrist = 0.565, m.underbust = 0.78, m.bustSpan = 0.175;
-  return m;
-}
 
 form::Form made(const form::Measurements& m, const form::FormParams& p) {
   auto f = form::make_form(m, p);
@@ -64,4 +52,145 @@ TEST(form, both_builds_at_both_sizes_measure_as_asked) {
       }
     }
   }
+}
+
+TEST(form, girths_agree_with_an_independent_section) {
+  form::FormParams p;
+  p.vertices = 6000;
+  p.arms = false;
+  const form::Measurements m = man();
+  const form::Form f = made(m, p);
+  const auto girth = [&](const std::string& landmark) {
+    const double y = f.mesh.landmarks.at(landmark)[1];
+    // The perimeter of the hull by turning a ruler around it (Cauchy): the mean width times pi.
+    double width = 0;
+    const int turns = 2000;
+    std::vector<Eigen::Vector2d> points;
+    for (Eigen::Index t = 0; t < f.mesh.faces.rows(); ++t) {
+      for (int k = 0; k < 3; ++k) {
+        const Eigen::Vector3d a = f.mesh.x.row(f.mesh.faces(t, k)), b = f.mesh.x.row(f.mesh.faces(t, (k + 1) % 3));
+        if ((a.y() < y) == (b.y() < y)) continue;
+        const Eigen::Vector3d q = a + (b - a) * (y - a.y()) / (b.y() - a.y());
+        points.emplace_back(q.x(), q.z());
+      }
+    }
+    for (int i = 0; i < turns; ++i) {
+      const Eigen::Vector2d d(std::cos(M_PI * (i + 0.5) / turns), std::sin(M_PI * (i + 0.5) / turns));
+      double low = 1e9, high = -1e9;
+      for (const auto& q : points) low = std::min(low, q.dot(d)), high = std::max(high, q.dot(d));
+      width += (high - low) / turns;
+    }
+    return M_PI * width;
+  };
+  EXPECT_NEAR(girth("waist_left"), m.waist, 0.002);
+  EXPECT_NEAR(girth("hip_left"), m.hips, 0.002);
+  EXPECT_NEAR(girth("seat_left"), m.seat, 0.002);
+  EXPECT_NEAR(girth("chest_left"), m.chest, 0.002);
+}
+
+TEST(form, landmarks_are_on_the_surface_and_where_they_belong) {
+  form::FormParams p;
+  p.vertices = 6000;
+  const form::Form f = made(woman(), [&] { auto q = p; q.sex = form::Sex::female; return q; }());
+  std::set<std::string> names;
+  for (const auto& [name, position] : f.mesh.landmarks) {
+    names.insert(name);
+    const Eigen::RowVector3d q(position[0], position[1], position[2]);
+    // Near the mesh: sections cut triangles, so a landmark may be half an edge from the nearest vertex.
+    EXPECT_LT((f.mesh.x.rowwise() - q).rowwise().norm().minCoeff(), 0.02) << name;
+  }
+  for (const char* name : {"neck_front", "neck_back", "hps_left", "hps_right", "shoulder_left", "shoulder_right", "armpit_left", "armpit_right", "bust_left",
+                           "bust_right", "waist_front", "waist_back", "waist_left", "waist_right", "hip_front", "hip_back", "hip_left", "hip_right", "seat_front",
+                           "seat_back", "seat_left", "seat_right", "elbow_left", "elbow_right", "wrist_left", "wrist_right"}) {
+    EXPECT_TRUE(names.count(name)) << name;
+  }
+  const auto at = [&](const char* name) { return Eigen::Vector3d(f.mesh.landmarks.at(name).data()); };
+  EXPECT_GT(at("bust_left").x(), 0.05) << "the left hand is at +x";
+  EXPECT_GT(at("bust_left").z(), at("waist_front").z()) << "facing +z";
+  EXPECT_GT(at("waist_front").z(), at("waist_back").z());
+  EXPECT_GT(at("hps_left").y(), at("shoulder_left").y());
+  EXPECT_GT(at("shoulder_left").y(), at("armpit_left").y());
+  EXPECT_GT(at("neck_back").y(), at("neck_front").y());
+  EXPECT_GT(at("elbow_left").y(), at("wrist_left").y());
+  EXPECT_NEAR(at("waist_left").y(), woman().waistToFloor, 1e-9);
+  EXPECT_NEAR(2 * at("bust_left").x(), *woman().bustSpan, 0.005);
+}
+
+TEST(form, regions_are_where_they_are_called) {
+  form::FormParams p;
+  p.vertices = 1500;
+  const form::Form f = made(man(), p);
+  ASSERT_EQ(f.mesh.region_names, (std::vector<std::string>{"torso", "neck", "arm_left", "arm_right"}));
+  const double hps = f.mesh.landmarks.at("hps_left")[1], shoulder = f.mesh.landmarks.at("shoulder_left")[0];
+  std::array<int, 4> count{};
+  for (Eigen::Index t = 0; t < f.mesh.faces.rows(); ++t) {
+    const Eigen::Vector3d c = (f.mesh.x.row(f.mesh.faces(t, 0)) + f.mesh.x.row(f.mesh.faces(t, 1)) + f.mesh.x.row(f.mesh.faces(t, 2))).transpose() / 3;
+    const int region = f.mesh.face_region[t];
+    ++count[static_cast<std::size_t>(region)];
+    if (region == 1) {
+      EXPECT_GT(c.y(), hps - 0.06);
+    }
+    if (region == 2) {
+      EXPECT_GT(c.x(), shoulder - 0.06);
+    }
+    if (region == 3) {
+      EXPECT_LT(c.x(), -shoulder + 0.06);
+    }
+    if (region == 0) {
+      EXPECT_LT(std::abs(c.x()), shoulder + 0.03);
+    }
+  }
+  EXPECT_EQ(count[2], count[3]);
+  for (const int n : count) EXPECT_GT(n, 50);
+  p.arms = false;
+  EXPECT_EQ(made(man(), p).mesh.region_names, (std::vector<std::string>{"torso", "neck"}));
+}
+
+TEST(form, must_fail) {
+  struct Row {
+    const char* what;
+    std::function<void(form::Measurements&, form::FormParams&)> spoil;
+    const char* code;
+    const char* key;
+  };
+  const std::vector<Row> rows = {
+      {"chest in cm read as m", [](auto& m, auto&) { m.chest = 100; }, "out_of_range", "chest"},
+      {"missing neck", [](auto& m, auto&) { m.neck = 0; }, "out_of_range", "neck"},
+      {"slope in degrees", [](auto& m, auto&) { m.shoulderSlope = 21; }, "out_of_range", "shoulderSlope"},
+      {"waist of another person", [](auto& m, auto&) { m.waist = 1.45; }, "implausible_measurement", "waist"},
+      {"seat above the hips", [](auto& m, auto&) { m.waistToSeat = 0.12; }, "implausible_measurement", "waistToSeat"},
+      {"armpit at the neck", [](auto& m, auto&) { m.waistToArmpit = 0.34; }, "implausible_measurement", "waistToArmpit"},
+      {"elbow at the wrist", [](auto& m, auto&) { m.shoulderToElbow = 0.45; }, "implausible_measurement", "shoulderToElbow"},
+      {"not a number", [](auto& m, auto&) { m.hips = std::nan(""); }, "out_of_range", "hips"},
+      {"too few vertices", [](auto&, auto& p) { p.vertices = 20; }, "out_of_range", "vertices"},
+      {"arms up", [](auto&, auto& p) { p.arm_angle = -0.5; }, "out_of_range", "arm_angle"},
+  };
+  for (const Row& row : rows) {
+    form::Measurements m = man();
+    form::FormParams p;
+    row.spoil(m, p);
+    const auto f = form::make_form(m, p);
+    ASSERT_FALSE(f) << row.what;
+    bool found = false;
+    for (const Issue& issue : f.issues()) {
+      found = found || (issue.code == row.code && issue.place.item == row.key);
+      EXPECT_FALSE(issue.remedy.empty());
+    }
+    EXPECT_TRUE(found) << row.what << ": " << to_string(f.issues()[0]) << " [" << f.issues()[0].code << "]";
+  }
+  // All of them at once, not only the first.
+  form::Measurements m = man();
+  m.chest = 0, m.wrist = 3;
+  EXPECT_GE(form::make_form(m, {}).issues().size(), 2u);
+}
+
+TEST(form, measurement_files) {
+  const auto missing = io::read_record<form::Measurements>("chest: 1000 mm\nwaist: 800 mm\n", "me.yaml");
+  ASSERT_FALSE(missing);
+  EXPECT_GE(missing.issues().size(), 15u) << "every missing measure is named";
+  const auto misspelt = io::read_record<form::Measurements>("chset: 1000 mm\n", "me.yaml");
+  ASSERT_FALSE(misspelt);
+  bool hint = false;
+  for (const Issue& issue : misspelt.issues()) hint = hint || issue.remedy.find("chest") != std::string::npos;
+  EXPECT_TRUE(hint);
 }

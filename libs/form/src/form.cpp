@@ -33,6 +33,7 @@ std::vector<Target> targets(const Measurements& m, const FormParams& params) {
     t.push_back({"shoulderToElbow", false, m.shoulderToElbow});
     t.push_back({"shoulderToWrist", false, m.shoulderToWrist});
   }
+  if (params.sex == Sex::female && m.bustSpan) t.push_back({"bustSpan", false, *m.bustSpan});
   if (params.sex == Sex::female && m.underbust) t.insert(t.begin() + 2, {"underbust", true, *m.underbust});
   return t;
 }
@@ -63,6 +64,10 @@ class Fitting {
     shift(t.slope, "shoulderSlope", m.shoulderSlope, 0.7, 0.06);
     t.slope = std::clamp(t.slope, 0.03, 0.9);
     shift(t.bust_height, "hpsToBust", m.hpsToBust, -1, 0.03 * u);
+    if (params_.sex == Sex::female && m.bustSpan) {
+      shift(t.bust_out, "bustSpan", *m.bustSpan, 0.4, 0.006 * u);
+      t.bust_out = std::clamp(t.bust_out, -0.03 * u, 0.03 * u);
+    }
     if (params_.arms) {
       scale(t.biceps, "biceps", m.biceps);
       scale(t.wrist, "wrist", m.wrist);
@@ -109,14 +114,16 @@ double misfit(const Gauge& g, const std::vector<Target>& wanted) {
 
 enum Region { torso, neck, arm_left, arm_right };
 
-int region(const Vector3d& p, const Levels& l, double neck_half, const FormParams& params) {
-  if ((p - l.neck_point).dot(l.neck_normal) > 0 && std::abs(p.x()) < 1.15 * neck_half) return neck;
+/// Of a point of the surface, by the landmarks: the armhole runs from the shoulder tip to the armpit; under it the side
+/// of the torso is nearer to the axis than the armpit and the arm farther.
+int region(const Vector3d& p, const Levels& l, const Gauge& gauge, const FormParams& params) {
+  const auto at = [&](const char* name) { return Vector3d(gauge.landmarks.at(name).data()); };
+  const double side = std::abs(p.x());
+  if ((p - l.neck_point).dot(l.neck_normal) > 0 && side < 1.15 * at("hps_left").x()) return neck;
   if (!params.arms) return torso;
-  // The armhole: a plane through the shoulder tip and the armpit.
-  const Vector3d q(std::abs(p.x()), p.y(), p.z());
-  const Vector3d tip(l.half_shoulder, l.shoulder, 0), pit(l.half_shoulder - 0.035 * l.unit, l.armpit, 0);
-  const Vector3d down = pit - tip, out = Vector3d(-down.y(), down.x(), 0).normalized();
-  if ((q - tip).dot(out) <= 0 || (q.y() < l.waist && q.x() < l.half_shoulder)) return torso;
+  const Vector3d tip = at("shoulder_left"), pit = at("armpit_left");
+  const double share = std::max((p.y() - pit.y()) / (tip.y() - pit.y()), 0.0);
+  if (side <= pit.x() + share * (tip.x() - pit.x())) return torso;
   return p.x() > 0 ? arm_left : arm_right;
 }
 
@@ -155,37 +162,43 @@ Result<Form> make_form(const Measurements& m, const FormParams& params) {
     tuning = fitting.corrected(tuning, gauge);
   }
 
-  // Then the mesh itself: wanted size by wanted number of vertices.
-  const Shape shape(m, params, tuning);
-  const Field field = [&](const Vector3d& p) { return shape(p); };
-  const double u = shape.levels().unit;
-  HalfSurface start = polygonise(field, shape.low(), shape.high(), 0.022 * u);
-  double edge = 0.0165 * u * std::sqrt(6000.0 / params.vertices);
+  // Then the mesh itself: wanted size by wanted number of vertices; the same triangles follow the shape while the measures
+  // are brought home on the mesh as it will be delivered. Where the shape has moved so far that triangles got thin, anew.
   HalfSurface half;
-  for (int attempt = 0; attempt < 5; ++attempt) {
-    const Sizing sizing = [&](const Vector3d& p) { return edge * shape.sizing(p); };
-    half = remesh(attempt == 0 ? start : half, field, sizing, attempt == 0 ? 8 : 4);
-    const double ratio = static_cast<double>(mirrored_vertex_count(half)) / params.vertices;
-    if (std::abs(ratio - 1) < 0.02) break;
-    edge *= std::sqrt(ratio);
-  }
-
-  // Last, the same triangles follow the shape while the measures are brought home on the mesh as it will be delivered.
-  fitting = Fitting(m, params);
   Whole whole;
   Gauge gauge;
   Levels levels;
-  for (int round = 0; round < 15; ++round) {
-    const Shape now(m, params, tuning);
-    const Field here = [&](const Vector3d& p) { return now(p); };
-    const Sizing sizing = [&](const Vector3d& p) { return edge * now.sizing(p); };
-    half = follow(std::move(half), here, sizing, 2);
-    whole = mirrored(half);
-    levels = now.levels();
-    gauge = measure(whole.x, whole.faces, levels, params);
-    ++form.iterations;
-    if (misfit(gauge, wanted) < 3e-4) break;
-    tuning = fitting.corrected(tuning, gauge);
+  double edge = 0;
+  for (int mesh_round = 0; mesh_round < 3; ++mesh_round) {
+    const Shape shape(m, params, tuning);
+    const Field field = [&](const Vector3d& p) { return shape(p); };
+    const double u = shape.levels().unit;
+    if (mesh_round == 0) {
+      half = polygonise(field, shape.low(), shape.high(), 0.022 * u);
+      edge = 0.0165 * u * std::sqrt(6000.0 / params.vertices);
+    }
+    for (int attempt = 0; attempt < 5; ++attempt) {
+      const Sizing sizing = [&](const Vector3d& p) { return edge * shape.sizing(p); };
+      half = remesh(std::move(half), field, sizing, mesh_round == 0 && attempt == 0 ? 8 : 4);
+      const double ratio = static_cast<double>(mirrored_vertex_count(half)) / params.vertices;
+      if (std::abs(ratio - 1) < 0.02) break;
+      edge *= std::sqrt(ratio);
+    }
+    Fitting fitting_mesh(m, params);
+    for (int round = 0; round < 15; ++round) {
+      const Shape now(m, params, tuning);
+      const Field here = [&](const Vector3d& p) { return now(p); };
+      const Sizing sizing = [&](const Vector3d& p) { return edge * now.sizing(p); };
+      half = follow(std::move(half), here, sizing, 2);
+      whole = mirrored(half);
+      levels = now.levels();
+      gauge = measure(whole.x, whole.faces, levels, params);
+      ++form.iterations;
+      if (misfit(gauge, wanted) < 3e-4) break;
+      tuning = fitting_mesh.corrected(tuning, gauge);
+    }
+    form.smallest_angle = smallest_angle(whole.x, whole.faces);
+    if (form.smallest_angle > 20 * 3.14159265358979 / 180 && misfit(gauge, wanted) < 1.5e-3) break;
   }
 
   form.mesh.x = whole.x;
@@ -196,7 +209,7 @@ Result<Form> make_form(const Measurements& m, const FormParams& params) {
   form.mesh.face_region.resize(whole.faces.rows());
   for (Eigen::Index f = 0; f < whole.faces.rows(); ++f) {
     const Vector3d centre = (whole.x.row(whole.faces(f, 0)) + whole.x.row(whole.faces(f, 1)) + whole.x.row(whole.faces(f, 2))).transpose() / 3;
-    form.mesh.face_region[f] = region(centre, levels, gauge.landmarks.at("hps_left")[0], params);
+    form.mesh.face_region[f] = region(centre, levels, gauge, params);
   }
   for (const Target& t : wanted) {
     const auto it = gauge.values.find(t.name);
@@ -209,7 +222,6 @@ Result<Form> make_form(const Measurements& m, const FormParams& params) {
     if (t.girth) form.mesh.girths[t.name] = measured;
     form.gauge.push_back(row);
   }
-  form.smallest_angle = smallest_angle(whole.x, whole.faces);
   issues = mesh::validate(form.mesh);
   if (!issues.empty()) return issues;
   return form;

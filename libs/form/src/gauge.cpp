@@ -146,11 +146,26 @@ Gauge measure(const mesh::Points3& x, const mesh::Triangles& faces, const Levels
   {
     const auto at_bust = ring(x, faces, {{0, l.bust, 0}, up}, {0, l.bust, 0.02 * u});
     const Polyline& curve = at_bust ? *at_bust : *chest;
-    Vector3d bust(0, l.bust, -1e9);
+    // The middle of the foremost stretch: the very front of a rounded shape would jump from vertex to vertex.
+    double foremost = -1e9;
+    const auto eligible = [&](const Vector3d& p) { return p.x() > 0.035 * u && p.x() < 0.16 * u; };
     for (Eigen::Index i = 0; i < curve.points.rows(); ++i) {
-      const Vector3d p = curve.points.row(i);
-      if (p.x() > 0.035 * u && p.x() < 0.16 * u && p.z() > bust.z()) bust = p;
+      if (eligible(curve.points.row(i))) foremost = std::max(foremost, curve.points(i, 2));
     }
+    double from = 1e9, to = -1e9;
+    for (Eigen::Index i = 0; i < curve.points.rows(); ++i) {
+      const Vector3d p = curve.points.row(i), q = curve.points.row((i + 1) % curve.points.rows());
+      if (!eligible(p) || !eligible(q)) continue;
+      const double level = foremost - 0.003 * u;
+      for (const Vector3d& r : {p, q}) {
+        if (r.z() >= level) from = std::min(from, r.x()), to = std::max(to, r.x());
+      }
+      if ((p.z() >= level) != (q.z() >= level)) {
+        const double cut = p.x() + (q.x() - p.x()) * (level - p.z()) / (q.z() - p.z());
+        from = std::min(from, cut), to = std::max(to, cut);
+      }
+    }
+    Vector3d bust = crossing(curve, {(from + to) / 2, 0, 0}, left, fore).value_or(Vector3d(0.09 * u, l.bust, foremost));
     if (params.sex == Sex::male) bust = crossing(curve, {0.095 * u, 0, 0}, left, fore).value_or(bust);
     mark_pair("bust", bust);
     g.values["bustSpan"] = 2 * bust.x();

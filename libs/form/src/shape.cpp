@@ -220,7 +220,7 @@ Shape::Shape(const Measurements& m, const FormParams& params, const Tuning& tuni
     for (const Ring& ring : rings) knots.emplace_back(ring.s, ring.*member);
     const Profile plain(knots, 0.014 * u);
     return Profile::sampled(-0.12 * u, h + 0.06 * u, 0.005 * u, [&](double s) {
-      return plain.at(s).f + drop * std::exp(-std::pow(s / (0.085 * u), 2));
+      return std::max(plain.at(s).f + drop * std::exp(-std::pow((s - 0.035 * u) / (0.09 * u), 2)), 0.012 * u);
     });
   };
   arm_high_ = arm_profile(&Ring::high, 0);
@@ -247,7 +247,7 @@ Shape::Shape(const Measurements& m, const FormParams& params, const Tuning& tuni
     bump(0, l.chest + 0.01 * u, front(l.chest), 0.018, 0.07, 0.05, -0.006);       // breast bone
   } else {
     Breast b;
-    b.x = m.bustSpan.value_or(0.185 * m.chest) / 2 - 0.002 * u;
+    b.x = m.bustSpan.value_or(0.185 * m.chest) / 2 + tuning.bust_out;
     b.y = l.bust - 0.004 * u;
     b.inner = 0.064 * u, b.outer = 0.080 * u, b.upper = 0.090 * u, b.lower = 0.060 * u;
     b.height = std::max(0.004 * u, 0.042 * u * (1 + 3 * (tuning.chest - 1)));
@@ -266,8 +266,10 @@ double Shape::torso(const Vector3d& p) const {
   const double d = db.f + (df.f - db.f) * sigma, dd = db.d + (df.d - db.d) * sigma;
   const double A = std::abs(p.x()) / w.f, B = std::abs(s) / d;
   const double big = std::max({A, B, 1e-3});
-  const double g = big * std::pow(std::pow(A / big, n) + std::pow(B / big, n), 1 / n);
-  const double a = std::pow(A / g, n - 1), b = std::pow(B / g, n - 1);
+  const double pa = A == big ? 1 : std::pow(A / big, n), pb = B == big ? 1 : std::pow(B / big, n), sum = pa + pb;
+  const double g = big * std::pow(sum, 1 / n);
+  // (A / g)^(n - 1) and (B / g)^(n - 1), without further powers
+  const double a = A > 0 ? pa / sum * g / A : 0, b = B > 0 ? pb / sum * g / B : 0;
   const double gx = a / w.f, gz = b / d;
   const double gy = -a * A * w.d / w.f - b * B * dd / d - (s > 0 ? 1 : -1) * gz * c.d;
   return (g - 1) / std::sqrt(gx * gx + gy * gy + gz * gz + 1e-6);
@@ -310,7 +312,7 @@ double Shape::operator()(const Vector3d& p) const {
     const auto one = [&](double side) {
       const Vector3d r = (Vector3d(p.x() * side, p.y(), p.z()) - b.centre).cwiseQuotient(b.size);
       const double sq = r.squaredNorm();
-      return sq > 20 ? 0.0 : std::exp(-sq);
+      return sq > 20 ? 0.0 : std::exp(-sq);  // 2e-9 of its height: less than a nanometre
     };
     f -= b.height * (b.centre.x() > 0 ? one(1) + one(-1) : one(1));
   }

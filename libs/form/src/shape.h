@@ -40,6 +40,7 @@ struct Tuning {
   double hps_height = 0;      ///< of the high point of the shoulder over the waist [m]
   double slope = 0;           ///< of the shoulder line as built [rad]
   double bust_height = 0;     ///< of the bust points over the waist [m]
+  double bust_out = 0;        ///< of the bust points' places from the requested ones [m]
   double arm_root = 0;        ///< how far the underarm is let down [m]
   double elbow = 0, hand = 0; ///< from the shoulder joint along the arm [m]
 };
