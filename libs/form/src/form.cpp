@@ -65,14 +65,14 @@ class Fitting {
     t.slope = std::clamp(t.slope, 0.03, 0.9);
     shift(t.bust_height, "hpsToBust", m.hpsToBust, -1, 0.03 * u);
     if (params_.sex == Sex::female && m.bustSpan) {
-      shift(t.bust_out, "bustSpan", *m.bustSpan, 0.4, 0.006 * u);
-      t.bust_out = std::clamp(t.bust_out, -0.03 * u, 0.03 * u);
+      shift(t.bust_out, "bustSpan", *m.bustSpan, 0.6, 0.01 * u);
+      t.bust_out = std::clamp(t.bust_out, -0.03 * u, 0.05 * u);
     }
     if (params_.arms) {
       scale(t.biceps, "biceps", m.biceps);
       scale(t.wrist, "wrist", m.wrist);
       shift(t.arm_root, "waistToArmpit", m.waistToArmpit, -0.7, 0.012 * u);
-      t.arm_root = std::clamp(t.arm_root, -0.1 * u, 0.15 * u);
+      t.arm_root = std::clamp(t.arm_root, -0.07 * u, 0.15 * u);
       shift(t.elbow, "shoulderToElbow", m.shoulderToElbow, 1, 0.03 * u);
       shift(t.hand, "shoulderToWrist", m.shoulderToWrist, 1, 0.05 * u);
     }
@@ -184,7 +184,7 @@ Result<Form> make_form(const Measurements& m, const FormParams& params) {
       if (std::abs(ratio - 1) < 0.02) break;
       edge *= std::sqrt(ratio);
     }
-    Fitting fitting_mesh(m, params);
+  Fitting fitting_mesh(m, params);
     for (int round = 0; round < 15; ++round) {
       const Shape now(m, params, tuning);
       const Field here = [&](const Vector3d& p) { return now(p); };

@@ -220,7 +220,8 @@ Shape::Shape(const Measurements& m, const FormParams& params, const Tuning& tuni
     for (const Ring& ring : rings) knots.emplace_back(ring.s, ring.*member);
     const Profile plain(knots, 0.014 * u);
     return Profile::sampled(-0.12 * u, h + 0.06 * u, 0.005 * u, [&](double s) {
-      return std::max(plain.at(s).f + drop * std::exp(-std::pow((s - 0.035 * u) / (0.09 * u), 2)), 0.012 * u);
+      const double r = plain.at(s).f, thinnest = std::min(0.6 * upper - r, 0.0);  // of the root, so that the arm is not cut off
+      return r + std::max(drop * std::exp(-std::pow((s - 0.035 * u) / (0.09 * u), 2)), thinnest);
     });
   };
   arm_high_ = arm_profile(&Ring::high, 0);
