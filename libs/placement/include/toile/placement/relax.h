@@ -1,0 +1,45 @@
+// Isometric relaxation: draws the seams of placed panels together while every edge keeps its length, the cloth stays
+// outside the support and no panel goes through another. The support may start flattened (front to back) between the
+// panels and swell to its true shape.
+#pragma once
+
+#include "toile/mesh/garment_mesh.h"
+#include "toile/mesh/support_mesh.h"
+#include "toile/placement/flatten.h"
+
+#include <functional>
+#include <vector>
+
+namespace toile::placement {
+
+using mesh::Points3;
+
+struct RelaxOptions {
+  double offset = 0.004;       ///< wanted distance of vertices from the support [m]
+  double clearance = 0.0015;   ///< least distance of the middles of edges [m]
+  double thickness = 0.001;    ///< wanted distance of panels from one another [m]
+  Flattening flattening;       ///< of the support at the start
+  int closing_steps = 60;      ///< seams close on the flattened support
+  int swelling_steps = 80;     ///< the support takes its true shape
+  int settling_steps = 60;     ///< the seams let go
+  int polishing_steps = 100;   ///< at most: stretch is taken out until both limits hold
+  double max_strain = 0.004;   ///< largest edge strain at which polishing stops [1]
+  double rms_strain = 0.0008;  ///< and root mean square [1]
+  double seam = 0.05;          ///< part of a seam's gap that one sweep closes
+  double bending = 0.1;        ///< part of a curvature that one sweep takes out, until polishing
+  std::function<void(double)> progress;  ///< called with 0..1 if given
+};
+
+/// garment  flat panels (uv, faces, welds); panels are relaxed in parallel
+/// x        start [m], |V| x 3
+/// ret      positions [m] on the true support; without intersections of the cloth with itself if the start had none
+Points3 relax(const mesh::GarmentMesh& garment, const Points3& x, const mesh::SupportMesh& support, const RelaxOptions& options);
+
+struct StrainSummary {
+  double largest = 0;  ///< absolute [1]
+  double rms = 0;      ///< root mean square [1]
+};
+/// Of every edge: length over length in the panel, minus 1.
+StrainSummary edge_strain(const mesh::GarmentMesh& garment, const Points3& x);
+
+}  // namespace toile::placement

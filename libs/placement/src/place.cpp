@@ -1,0 +1,374 @@
+#include "toile/placement/place.h"
+
+#include "toile/contact/exact.h"
+#include "toile/contact/support_field.h"
+#include "toile/geometry/slice.h"
+#include "toile/placement/coarse.h"
+#include "toile/placement/developable.h"
+#include "toile/placement/relax.h"
+
+#include <Eigen/Geometry>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace toile::placement {
+
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr double kShoulderFlatten = 0.25;  // front and back nearly meet at the shoulders
+constexpr double kPolish = 0.8;           // polishing goes on until strains are this part of what is allowed
+constexpr double kArmTransition = 0.08;   // from the trunk's side to where arms keep their true shape [m]
+constexpr double kNarrow = 0.01;          // cloth may lack this part of a girth before it is refused: it can slide to where it fits
+constexpr double kSleeveGap = 0.004;       // between a sleeve and the trunk's panels at the start [m]
+
+double polygon_perimeter(const Points2& p) {
+  double sum = 0;
+  for (Eigen::Index i = 0; i < p.rows(); ++i) sum += (p.row((i + 1) % p.rows()) - p.row(i)).norm();
+  return sum;
+}
+
+// Convex hull, (z, x) counter-clockwise, of the free trunk over a range of heights, flattened and made symmetric.
+Points2 trunk_hull(const BodyFrame& frame, double low, double high, double flatten, double z_middle) {
+  std::vector<Vector3d> points;
+  for (const Section& section : frame.sections) {
+    if (section.merged || section.y < low - 0.01 || section.y > high + 0.01) continue;
+    for (Eigen::Index i = 0; i < section.hull.rows(); ++i) {
+      const double z = z_middle + flatten * (section.hull(i, 0) - z_middle), x = section.hull(i, 1) - frame.x_mid;
+      points.emplace_back(frame.x_mid + x, 0, z);
+      points.emplace_back(frame.x_mid - x, 0, z);
+    }
+  }
+  Points3 all(static_cast<Eigen::Index>(points.size()), 3);
+  for (std::size_t i = 0; i < points.size(); ++i) all.row(static_cast<Eigen::Index>(i)) = points[i].transpose();
+  const Points3 hull = geometry::convex_hull(all, Vector3d::UnitY());
+  Points2 flat(hull.rows(), 2);
+  flat.col(0) = hull.col(2);
+  flat.col(1) = hull.col(0);
+  return flat;
+}
+
+// How much cloth lies on the level line h in the unrolled part, panels counted together [m].
+double width_at(const mesh::GarmentMesh& garment, const Layout& layout, const std::vector<Vector2d>& flat, Part part, double h, std::vector<int>* panels) {
+  double sum = 0;
+  for (Eigen::Index f = 0; f < garment.face_count(); ++f) {
+    if (layout.panels[static_cast<std::size_t>(garment.face_panel[f])].part != part) continue;
+    double cut[2];
+    int count = 0;
+    for (int k = 0; k < 3 && count < 2; ++k) {
+      const Vector2d &a = flat[static_cast<std::size_t>(garment.faces(f, k))], &b = flat[static_cast<std::size_t>(garment.faces(f, (k + 1) % 3))];
+      if ((a.y() < h) != (b.y() < h)) cut[count++] = a.x() + (h - a.y()) / (b.y() - a.y()) * (b.x() - a.x());
+    }
+    if (count < 2) continue;
+    sum += std::abs(cut[1] - cut[0]);
+    if (panels && (panels->empty() || panels->back() != garment.face_panel[f])) panels->push_back(garment.face_panel[f]);
+  }
+  if (panels) {
+    std::sort(panels->begin(), panels->end());
+    panels->erase(std::unique(panels->begin(), panels->end()), panels->end());
+  }
+  return sum;
+}
+
+std::string names_of(const mesh::GarmentMesh& garment, const std::vector<int>& panels) {
+  std::string text;
+  for (int p : panels) text += (text.empty() ? "" : ", ") + garment.panels[static_cast<std::size_t>(p)].name;
+  return text;
+}
+
+Issue too_narrow(const mesh::GarmentMesh& garment, const std::vector<int>& panels, double width, double needed, const std::string& where) {
+  return Issue{.code = "too_narrow", .place = {.item = panels.size() == 1 ? "panel " + names_of(garment, panels) : "panels " + names_of(garment, panels)},
+               .what = fmt::format("{} measure{} {:.0f} mm round, but {} needs {:.0f} mm with the clearance", names_of(garment, panels), panels.size() == 1 ? "s" : "",
+                                   1e3 * width, where, 1e3 * needed),
+               .remedy = "use a larger size of the pattern or a smaller support", .category = Category::input};
+}
+
+}  // namespace
+
+Result<Start> bend(const mesh::GarmentMesh& garment, const mesh::SupportMesh& support, const BodyFrame& frame, const Layout& layout, const PlaceParams& params) {
+  (void)support;
+  Issues issues;
+  Start start;
+  const Eigen::Index n = garment.vertex_count();
+  start.x.resize(n, 3);
+  std::vector<Vector2d> flat(static_cast<std::size_t>(n));
+  for (Eigen::Index v = 0; v < n; ++v) {
+    flat[static_cast<std::size_t>(v)] = layout.panels[static_cast<std::size_t>(garment.vertex_panel[v])](garment.uv.row(v).transpose());
+  }
+  const auto part_of = [&](Eigen::Index v) { return layout.panels[static_cast<std::size_t>(garment.vertex_panel[v])].part; };
+
+  // The trunk: a vertical tube around the flattened body, as wide as the panels are together.
+  double low = 1e9, high = -1e9, a_low = 1e9, a_high = -1e9;
+  for (Eigen::Index v = 0; v < n; ++v) {
+    if (part_of(v) != Part::trunk) continue;
+    low = std::min(low, flat[static_cast<std::size_t>(v)].y());
+    high = std::max(high, flat[static_cast<std::size_t>(v)].y());
+    a_low = std::min(a_low, flat[static_cast<std::size_t>(v)].x());
+    a_high = std::max(a_high, flat[static_cast<std::size_t>(v)].x());
+  }
+  start.flattening.depth = params.flatten.value_or(layout.shoulder_welds.empty() ? 1.0 : kShoulderFlatten);
+  start.flattening.x_mid = frame.x_mid;
+  if (frame.arm_left || frame.arm_right) {
+    const Section& section = frame.section(frame.armpit - 0.01);
+    start.flattening.x_trunk = section.hull.col(1).maxCoeff() - frame.x_mid;
+    start.flattening.x_arm = start.flattening.x_trunk + kArmTransition;
+  }
+  if (low < high) {
+    double z_low = 1e9, z_high = -1e9;
+    for (const Section& section : frame.sections) {
+      if (section.y < low - 0.01 || section.y > high + 0.01) continue;
+      z_low = std::min(z_low, section.hull.col(0).minCoeff());
+      z_high = std::max(z_high, section.hull.col(0).maxCoeff());
+    }
+    if (z_low > z_high) {
+      return Issue{.code = "off_support", .place = {.item = "panels of the trunk"},
+                   .what = fmt::format("they would hang between {:.3f} m and {:.3f} m, where the support has no trunk", low, high),
+                   .remedy = "check the anchors (point, at, shift) and the units of pattern and support", .category = Category::input};
+    }
+    start.flattening.z_middle = 0.5 * (z_low + z_high);
+    const double margin = std::max(2 * params.offset, 0.008);
+    double girth = layout.girth_trunk;
+    const auto spare = [&](double flatten) {
+      return (girth - polygon_perimeter(trunk_hull(frame, low, high, flatten, start.flattening.z_middle))) / (2 * std::numbers::pi);
+    };
+    if (girth <= 0) girth = std::max(a_high - a_low, polygon_perimeter(trunk_hull(frame, low, high, start.flattening.depth, start.flattening.z_middle)) + 2 * std::numbers::pi * margin);
+    while (spare(start.flattening.depth) < margin && start.flattening.depth > 0.06) start.flattening.depth *= 0.95;
+    // Level by level, up to the lowest point of an armhole: cloth against body.
+    if (layout.girth_trunk > 0) {
+      double ceiling = frame.armpit;
+      for (const mesh::Weld& weld : garment.welds) {
+        const bool a = part_of(weld.a) == Part::trunk, b = part_of(weld.b) == Part::trunk;
+        if (a != b) ceiling = std::min(ceiling, flat[static_cast<std::size_t>(a ? weld.a : weld.b)].y());
+      }
+      double worst = 0;
+      std::optional<Issue> narrow;
+      for (const Section& section_ : frame.sections) {
+        if (section_.merged || section_.y > ceiling - 0.01 || section_.y < low + 0.005 || section_.y > high - 0.005) continue;
+        std::vector<int> panels;
+        // The widest within a hand's breadth: edges curve, bands slide.
+        double width = 0;
+        for (const double off : {0.0, -0.02, 0.02}) width = std::max(width, width_at(garment, layout, flat, Part::trunk, section_.y + off, &panels));
+        if (panels.empty()) continue;
+        const double needed = section_.girth + 2 * std::numbers::pi * params.clearance;
+        if (needed / std::max(width, 1e-6) > std::max(1 + kNarrow, worst)) {
+          worst = needed / std::max(width, 1e-6);
+          narrow = too_narrow(garment, panels, width, needed, fmt::format("the body at height {:.2f} m", section_.y));
+        }
+      }
+      if (narrow) issues.push_back(*narrow);
+    }
+    if (spare(start.flattening.depth) < params.clearance && issues.empty()) {
+      issues.push_back({.code = "too_narrow", .place = {.item = "panels of the trunk"},
+                        .what = fmt::format("sewn together they measure {:.0f} mm round; the body between {:.2f} m and {:.2f} m does not fit in", 1e3 * girth, low, high),
+                        .remedy = "use a larger size of the pattern or a smaller support", .category = Category::input});
+    }
+    if (!issues.empty()) return issues;
+    const ConvexSection section(trunk_hull(frame, low, high, start.flattening.depth, start.flattening.z_middle), spare(start.flattening.depth), Vector2d(start.flattening.z_middle, frame.x_mid), Vector2d(1, 0));
+    for (Eigen::Index v = 0; v < n; ++v) {
+      if (part_of(v) != Part::trunk) continue;
+      const Vector2d at = section.point(flat[static_cast<std::size_t>(v)].x());
+      start.x.row(v) << at.y(), flat[static_cast<std::size_t>(v)].y(), at.x();
+    }
+  }
+
+  // Arms: a round tube about the arm's axis, turned so that its seams look at the panels that they join, and moved
+  // outwards until it is clear of them.
+  for (const Part part : {Part::arm_left, Part::arm_right}) {
+    const double girth = part == Part::arm_left ? layout.girth_arm_left : layout.girth_arm_right;
+    const std::optional<Limb>& limb = part == Part::arm_left ? frame.arm_left : frame.arm_right;
+    std::vector<Eigen::Index> members;
+    double h_low = 1e9, h_high = -1e9;
+    for (Eigen::Index v = 0; v < n; ++v) {
+      if (part_of(v) != part) continue;
+      members.push_back(v);
+      h_low = std::min(h_low, flat[static_cast<std::size_t>(v)].y());
+      h_high = std::max(h_high, flat[static_cast<std::size_t>(v)].y());
+    }
+    if (members.empty()) continue;
+    TOILE_CHECK(limb.has_value(), "part {}", static_cast<int>(part));
+    const Vector3d &origin = limb->origin, &outwards = limb->direction;
+    double radius = girth / (2 * std::numbers::pi);
+    if (girth <= 0) {
+      for (const LimbPoint& point : limb->points) radius = std::max(radius, point.radius + 2 * params.offset);
+    }
+    // Seen from outside with the shoulder up: u to the right. `up` is inwards along the arm.
+    const Vector3d up = -outwards;
+    Vector3d top = Vector3d::UnitY() - Vector3d::UnitY().dot(up) * up;
+    if (top.norm() < 1e-3) top = Vector3d::UnitX() - Vector3d::UnitX().dot(up) * up;
+    top.normalize();
+    const Vector3d across = up.cross(top);  // across x up = top (outwards of the tube)
+    // Angle and position along the arm from the mates on the trunk.
+    double cosine = 0, sine = 0;
+    std::vector<std::pair<Eigen::Index, Eigen::Index>> mates;  // arm vertex, trunk vertex
+    for (const mesh::Weld& weld : garment.welds) {
+      if (part_of(weld.a) == part && part_of(weld.b) == Part::trunk) mates.emplace_back(weld.a, weld.b);
+      if (part_of(weld.b) == part && part_of(weld.a) == Part::trunk) mates.emplace_back(weld.b, weld.a);
+    }
+    double slide = 0;
+    for (const auto& [own, other] : mates) {
+      const Vector3d d = start.x.row(other).transpose() - origin;
+      const double angle = std::atan2(d.dot(across), d.dot(top)) - flat[static_cast<std::size_t>(own)].x() / radius;
+      cosine += std::cos(angle);
+      sine += std::sin(angle);
+      slide += (d.dot(up) - flat[static_cast<std::size_t>(own)].y()) / static_cast<double>(mates.size());
+    }
+    const double turn = mates.empty() ? 0 : std::atan2(sine, cosine);
+    if (mates.empty()) slide = -h_high;
+    if (girth > 0) {
+      double ceiling = h_high;
+      for (const auto& [own, other] : mates) ceiling = std::min(ceiling, flat[static_cast<std::size_t>(own)].y());
+      double worst = 0;
+      std::optional<Issue> narrow;
+      for (double h = h_low + 0.005; h < ceiling - 0.005; h += 0.01) {
+        const double along = -(h + slide);
+        const LimbPoint* nearest = nullptr;
+        for (const LimbPoint& point : limb->points) {
+          if (std::abs((point.centre - limb->origin).dot(limb->direction) - along) < 0.01) nearest = &point;
+        }
+        if (!nearest) continue;
+        std::vector<int> panels;
+        const double width = width_at(garment, layout, flat, part, h, &panels);
+        const double needed = nearest->girth + 2 * std::numbers::pi * params.clearance;
+        if (needed / std::max(width, 1e-6) > std::max(1 + kNarrow, worst)) {
+          worst = needed / std::max(width, 1e-6);
+          narrow = too_narrow(garment, panels, width, needed, "the arm there");
+        }
+      }
+      if (narrow) issues.push_back(*narrow);
+    }
+    const auto tube = [&](const Vector2d& p, double along) {
+      const double angle = turn + p.x() / radius;
+      return Vector3d(origin + radius * (std::cos(angle) * top + std::sin(angle) * across) + (p.y() + along) * up);
+    };
+    // Outwards until no vertex of a trunk panel lies in the tube's wall (within a margin).
+    const double margin = kSleeveGap + 0.012;
+    double needed = slide;
+    for (Eigen::Index v = 0; v < n; ++v) {
+      if (part_of(v) != Part::trunk) continue;
+      const Vector3d d = start.x.row(v).transpose() - origin;
+      const double along = d.dot(up);
+      const Vector3d radial = d - along * up;
+      if (std::abs(radial.norm() - radius) > margin) continue;
+      // the sleeve's upper edge at this angle
+      const double angle = std::atan2(radial.dot(across), radial.dot(top));
+      double edge = -1e9;
+      for (const Eigen::Index own : members) {
+        const Vector2d& p = flat[static_cast<std::size_t>(own)];
+        double difference = turn + p.x() / radius - angle;
+        difference -= 2 * std::numbers::pi * std::round(difference / (2 * std::numbers::pi));
+        if (std::abs(difference) * radius < margin) edge = std::max(edge, p.y());
+      }
+      if (edge > -1e8) needed = std::min(needed, along - margin - edge);
+    }
+    for (const Eigen::Index v : members) start.x.row(v) = tube(flat[static_cast<std::size_t>(v)], needed).transpose();
+  }
+  if (!issues.empty()) return issues;
+  return start;
+}
+
+Report measure(const mesh::GarmentMesh& garment, const mesh::SupportMesh& support) {
+  Report report;
+  const StrainSummary strain = edge_strain(garment, garment.x);
+  report.max_strain = strain.largest;
+  report.rms_strain = strain.rms;
+  double area = 0, flat_area = 0;
+  const Eigen::VectorXd rest = mesh::rest_areas(garment);
+  for (Eigen::Index f = 0; f < garment.face_count(); ++f) {
+    const Vector3d a = garment.x.row(garment.faces(f, 0)), b = garment.x.row(garment.faces(f, 1)), c = garment.x.row(garment.faces(f, 2));
+    area += 0.5 * (b - a).cross(c - a).norm();
+    flat_area += rest[f];
+  }
+  report.area_change = flat_area > 0 ? area / flat_area - 1 : 0;
+  std::vector<SeamGap> gaps(garment.seams.size());
+  std::vector<int> counts(garment.seams.size(), 0);
+  double total = 0;
+  for (std::size_t i = 0; i < gaps.size(); ++i) gaps[i].seam = static_cast<int>(i);
+  for (const mesh::Weld& weld : garment.welds) {
+    const double gap = (garment.x.row(weld.a) - garment.x.row(weld.b)).norm();
+    SeamGap& seam = gaps[static_cast<std::size_t>(weld.seam)];
+    seam.mean += gap;
+    seam.largest = std::max(seam.largest, gap);
+    ++counts[static_cast<std::size_t>(weld.seam)];
+    total += gap;
+    report.largest_seam_gap = std::max(report.largest_seam_gap, gap);
+  }
+  for (std::size_t i = 0; i < gaps.size(); ++i) {
+    if (counts[i] > 0) gaps[i].mean /= counts[i];
+  }
+  report.seams = std::move(gaps);
+  report.mean_seam_gap = garment.welds.empty() ? 0 : total / static_cast<double>(garment.welds.size());
+  const contact::Surface body = contact::make_surface(static_cast<int>(support.x.rows()), support.faces);
+  const contact::SupportField field(body, support.x);
+  std::vector<contact::SurfacePoint> near;
+  std::vector<int> warm;
+  field.nearest(garment.x, 10, near, warm);
+  report.smallest_gap = 1e9;
+  for (const auto& p : near) {
+    report.smallest_gap = std::min(report.smallest_gap, p.distance);
+    if (p.distance < 0) ++report.vertices_inside;
+  }
+  const contact::Surface cloth = contact::make_surface(static_cast<int>(garment.x.rows()), garment.faces, mesh::particles(garment));
+  report.self_intersections = static_cast<int>(contact::self_intersections(cloth, garment.x).size());
+  report.support_intersections = static_cast<int>(contact::support_intersections(cloth, garment.x, body, support.x).size());
+  return report;
+}
+
+Result<Placed> place(const mesh::GarmentMesh& garment, const mesh::SupportMesh& support, const PlaceParams& params, const std::function<void(double)>& progress) {
+  TOILE_TRY(const BodyFrame frame, body_frame(support));
+  TOILE_TRY(const Layout layout, make_layout(garment, support, frame, params));
+  TOILE_TRY(const Start start, bend(garment, support, frame, layout, params));
+  RelaxOptions options;
+  options.offset = params.offset;
+  options.clearance = params.clearance;
+  options.thickness = params.thickness;
+  options.flattening = start.flattening;
+  options.closing_steps = params.closing_steps;
+  options.swelling_steps = params.swelling_steps;
+  options.settling_steps = params.settling_steps;
+  options.polishing_steps = params.polishing_steps;
+  options.max_strain = kPolish * params.max_strain;
+  options.rms_strain = kPolish * params.rms_strain;
+  options.seam = params.seam;
+  options.bending = params.bending;
+  options.progress = [&](double f) {
+    if (progress) progress(0.5 * f);
+  };
+  Placed placed;
+  placed.garment = garment;
+  // Large folds on a coarse mesh, where they are cheap; then the fine one needs to lose the creases between coarse
+  // triangles only.
+  const CoarseGarment coarse = coarsen(garment, params.coarse);
+  const Points3 folded = relax(coarse.mesh, coarse.restricted(start.x), support, options);
+  options.flattening.depth = 1;
+  options.closing_steps = 0;
+  options.swelling_steps = 0;
+  options.settling_steps = 1;
+  options.progress = [&](double f) {
+    if (progress) progress(0.5 + 0.5 * f);
+  };
+  placed.garment.x = relax(garment, coarse.prolonged(folded), support, options);
+  placed.report = measure(placed.garment, support);
+  const Report& report = placed.report;
+  const auto finding = [&](const char* code, const std::string& what, const std::string& remedy) {
+    placed.findings.push_back({.code = code, .place = {.item = "garment"}, .what = what, .remedy = remedy, .category = Category::check});
+  };
+  if (report.max_strain > params.max_strain) {
+    finding("strain", fmt::format("largest edge strain {:.4f} is over {:.4f}", report.max_strain, params.max_strain), "give more settling_steps, a smaller offset, or a larger size");
+  }
+  if (report.rms_strain > params.rms_strain) {
+    finding("strain", fmt::format("root mean square edge strain {:.5f} is over {:.5f}", report.rms_strain, params.rms_strain), "give more settling_steps, a smaller offset, or a larger size");
+  }
+  if (report.vertices_inside > 0 || report.support_intersections > 0) {
+    finding("inside_support", fmt::format("{} vertices are inside the support, {} pairs of triangles cut", report.vertices_inside, report.support_intersections), "give a larger offset or a finer mesh");
+  }
+  if (report.self_intersections > 0) {
+    finding("self_intersection", fmt::format("{} pairs of cloth triangles cut one another", report.self_intersections), "give more steps, or move panels apart (shift)");
+  }
+  return placed;
+}
+
+}  // namespace toile::placement
