@@ -1,0 +1,450 @@
+#include "toile/placement/place.h"
+
+#include "garments.h"
+#include "toile/form/form.h"
+#include "toile/base/parallel.h"
+#include "toile/io/ply.h"
+#include "toile/mesh/topology.h"
+#include "toile/placement/coarse.h"
+#include "toile/placement/developable.h"
+#include "toile/placement/relax.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+using namespace toile;
+using namespace toile::placement;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using test::add_rectangle;
+
+namespace {
+
+const mesh::SupportMesh& man() {
+  static const mesh::SupportMesh mesh = [] {
+    form::Measurements m;
+    m.chest = 1.0, m.waist = 0.783, m.hips = 0.928, m.seat = 0.977, m.neck = 0.4, m.biceps = 0.318, m.wrist = 0.165;
+    m.shoulderToShoulder = 0.43, m.shoulderSlope = 21 * M_PI / 180, m.hpsToWaistBack = 0.46, m.hpsToBust = 0.265;
+    m.waistToArmpit = 0.215, m.waistToHips = 0.13, m.waistToSeat = 0.22, m.waistToFloor = 1.085;
+    m.shoulderToElbow = 0.32, m.shoulderToWrist = 0.575, m.waistToUpperLeg = 0.27;
+    form::FormParams p;
+    p.vertices = 1500;
+    return form::make_form(m, p)->mesh;
+  }();
+  return mesh;
+}
+
+// Vertex of a rectangle panel of garments.h by column and row.
+int at(const mesh::GarmentMesh& g, int panel, int columns, int i, int j) {
+  for (Eigen::Index v = 0; v < g.vertex_count(); ++v) {
+    if (g.vertex_panel[v] == panel) return static_cast<int>(v) + j * (columns + 1) + i;
+  }
+  ADD_FAILURE() << "no panel " << panel;
+  return 0;
+}
+
+int add_seam(mesh::GarmentMesh& g, const std::string& name) {
+  const int id = static_cast<int>(g.seams.size());
+  g.seams.push_back({.id = id, .name = name});
+  return id;
+}
+
+constexpr double kCell = 0.02;
+
+// Front and back, sewn at the sides: `nu` columns each, `nv` rows.
+mesh::GarmentMesh tube(int nu, int nv) {
+  mesh::GarmentMesh g;
+  add_rectangle(g, "front", nu, nv, kCell);
+  add_rectangle(g, "back", nu, nv, kCell);
+  const int left = add_seam(g, "left"), right = add_seam(g, "right");
+  for (int j = 0; j <= nv; ++j) g.welds.push_back({at(g, 0, nu, nu, j), at(g, 1, nu, 0, j), left});
+  for (int j = 0; j <= nv; ++j) g.welds.push_back({at(g, 0, nu, 0, j), at(g, 1, nu, nu, j), right});
+  return g;
+}
+
+// Takes a rectangle's cells away where drop(column, row) says so, and the vertices that no face uses then.
+template <class Drop>
+void cut_away(mesh::GarmentMesh& g, int panel, int columns, const Drop& drop) {
+  const int base = at(g, panel, columns, 0, 0);
+  std::vector<int> faces;
+  for (int f = 0; f < g.face_count(); ++f) {
+    int i = columns, j = 1 << 30;
+    for (int k = 0; k < 3; ++k) {
+      const int v = g.faces(f, k) - base;
+      i = std::min(i, v % (columns + 1));
+      j = std::min(j, v / (columns + 1));
+    }
+    if (g.face_panel[f] != panel || !drop(i, j)) faces.push_back(f);
+  }
+  const mesh::GarmentMesh old = g;
+  std::vector<int> number(static_cast<std::size_t>(old.vertex_count()), -1);
+  int count = 0;
+  for (int v = 0; v < old.vertex_count(); ++v) {
+    bool used = false;
+    for (int f : faces) used = used || (old.faces.row(f).array() == v).any();
+    if (used) number[static_cast<std::size_t>(v)] = count++;
+  }
+  const auto mapped = [&](int v) { return number[static_cast<std::size_t>(v)]; };
+  for (int v = 0; v < old.vertex_count(); ++v) {
+    if (mapped(v) < 0) continue;
+    g.x.row(mapped(v)) = old.x.row(v);
+    g.uv.row(mapped(v)) = old.uv.row(v);
+    g.vertex_panel[mapped(v)] = old.vertex_panel[v];
+  }
+  g.x.conservativeResize(count, 3);
+  g.uv.conservativeResize(count, 2);
+  g.vertex_panel.conservativeResize(count);
+  g.faces.resize(static_cast<Eigen::Index>(faces.size()), 3);
+  g.face_panel.resize(g.faces.rows());
+  g.face_laminate = mesh::Ids::Constant(g.faces.rows(), -1);
+  for (std::size_t f = 0; f < faces.size(); ++f) {
+    for (int k = 0; k < 3; ++k) g.faces(static_cast<Eigen::Index>(f), k) = mapped(old.faces(faces[f], k));
+    g.face_panel[static_cast<Eigen::Index>(f)] = old.face_panel[faces[f]];
+  }
+  std::erase_if(g.run_vertices, [&](const mesh::RunVertex& r) { return mapped(r.vertex) < 0; });
+  for (auto& r : g.run_vertices) r.vertex = mapped(r.vertex);
+  std::erase_if(g.points, [&](const mesh::NamedPoint& r) { return mapped(r.vertex) < 0; });
+  for (auto& r : g.points) r.vertex = mapped(r.vertex);
+  std::erase_if(g.welds, [&](const mesh::Weld& w) { return mapped(w.a) < 0 || mapped(w.b) < 0; });
+  for (auto& w : g.welds) w.a = mapped(w.a), w.b = mapped(w.b);
+}
+
+// A T-shirt of straight lines on a 20 mm grid: side seams, set-in sleeves, shoulders, a square neck.
+mesh::GarmentMesh boxy_tee() {
+  constexpr int nu = 28, nv = 33, inset = 3, depth = 11, shoulder = 5, neck = 3, sleeve_length = 8, cap = inset + depth;
+  mesh::GarmentMesh g;
+  add_rectangle(g, "front", nu, nv, kCell);
+  add_rectangle(g, "back", nu, nv, kCell);
+  add_rectangle(g, "sleeve", 2 * cap, sleeve_length, kCell);
+  add_rectangle(g, "sleeve_m", 2 * cap, sleeve_length, kCell);
+  const int first = nv - depth;
+  const int side_left = add_seam(g, "side_left"), side_right = add_seam(g, "side_right");
+  for (int j = 0; j <= first; ++j) g.welds.push_back({at(g, 0, nu, nu, j), at(g, 1, nu, 0, j), side_left});
+  for (int j = 0; j <= first; ++j) g.welds.push_back({at(g, 0, nu, 0, j), at(g, 1, nu, nu, j), side_right});
+  const int shoulder_left = add_seam(g, "shoulder_left"), shoulder_right = add_seam(g, "shoulder_right");
+  for (int i = inset; i <= inset + shoulder; ++i) g.welds.push_back({at(g, 0, nu, nu - i, nv), at(g, 1, nu, i, nv), shoulder_left});
+  for (int i = inset; i <= inset + shoulder; ++i) g.welds.push_back({at(g, 0, nu, i, nv), at(g, 1, nu, nu - i, nv), shoulder_right});
+  // Armholes from the underarm to the shoulder: in along the inset, then up. The plain sleeve is the right one: its front
+  // half is at +u.
+  const auto edge = [&](int panel, int k, bool far) {
+    const int i = std::min(k, inset), j = first + std::max(0, k - inset);
+    return at(g, panel, nu, far ? nu - i : i, j);
+  };
+  const int m = 2 * cap;
+  const int armhole_right = add_seam(g, "armhole_right"), armhole_left = add_seam(g, "armhole_left");
+  for (int k = 0; k <= cap; ++k) g.welds.push_back({at(g, 2, m, m - k, sleeve_length), edge(0, k, false), armhole_right});
+  for (int k = 0; k <= cap; ++k) g.welds.push_back({at(g, 2, m, k, sleeve_length), edge(1, k, true), armhole_right});
+  for (int k = 0; k <= cap; ++k) g.welds.push_back({at(g, 3, m, k, sleeve_length), edge(0, k, true), armhole_left});
+  for (int k = 0; k <= cap; ++k) g.welds.push_back({at(g, 3, m, m - k, sleeve_length), edge(1, k, false), armhole_left});
+  const int underarm_right = add_seam(g, "underarm_right"), underarm_left = add_seam(g, "underarm_left");
+  for (int j = 0; j <= sleeve_length; ++j) g.welds.push_back({at(g, 2, m, m, j), at(g, 2, m, 0, j), underarm_right});
+  for (int j = 0; j <= sleeve_length; ++j) g.welds.push_back({at(g, 3, m, m, j), at(g, 3, m, 0, j), underarm_left});
+  for (const int panel : {1, 0}) {
+    cut_away(g, panel, nu, [&](int i, int j) {
+      if (j >= first && (i < inset || i >= nu - inset)) return true;
+      return j >= nv - neck && i >= inset + shoulder && i < nu - inset - shoulder;
+    });
+  }
+  return g;
+}
+
+double seam_mean(const Report& report, const mesh::GarmentMesh& g, const std::string& name) {
+  for (const SeamGap& gap : report.seams) {
+    if (g.seams[static_cast<std::size_t>(gap.seam)].name == name) return gap.mean;
+  }
+  ADD_FAILURE() << "no seam " << name;
+  return 0;
+}
+
+std::vector<std::string> codes(const Issues& issues) {
+  std::vector<std::string> result;
+  for (const Issue& issue : issues) result.push_back(issue.code);
+  return result;
+}
+
+}  // namespace
+
+// ---- isometric maps
+
+TEST(developable, cylinder_keeps_lengths_but_for_the_chord) {
+  Frame frame;
+  frame.origin = {0.1, 0.2, 0.3};
+  frame.across = Vector3d(1, 0, 1).normalized();
+  frame.up = Vector3d(0, 1, 0);
+  const double r = 0.06;
+  for (int k = 0; k < 8; ++k) {
+    // a strip at any angle round the cylinder, 45 degrees among them
+    const double angle = k * std::numbers::pi / 8;
+    const Vector2d p(0.07, -0.02), d = 0.01 * Vector2d(std::cos(angle), std::sin(angle));
+    const double length = (on_cylinder(frame, r, p + d) - on_cylinder(frame, r, p)).norm();
+    const double chord = std::hypot(2 * r * std::sin(0.5 * d.x() / r), d.y());
+    EXPECT_NEAR(length, chord, 1e-15);
+    EXPECT_LE(std::abs(length / 0.01 - 1), std::pow(0.01 / r, 2) / 24 + 1e-12);
+  }
+  EXPECT_NEAR((on_cylinder(frame, r, {0, 0}) - frame.origin).norm(), 0, 1e-16);
+  // the face side looks outwards: away from the axis
+  const Vector3d axis = frame.origin - r * frame.out();
+  EXPECT_NEAR((on_cylinder(frame, r, {0.05, 0}) - axis).norm(), r, 1e-15);
+}
+
+TEST(developable, square_on_a_cone_keeps_lengths_but_for_the_chord) {
+  for (const double slant : {0.5, -0.5}) {
+    for (const double radius : {0.1, 0.3, 0.5}) {
+      const Frame frame;
+      const auto map = [&](double u, double v) { return on_cone(frame, radius, slant, {u, v}); };
+      EXPECT_NEAR((map(0, 0) - frame.origin).norm(), 0, 1e-15);
+      double worst = 0;
+      for (int i = -10; i < 10; ++i) {
+        for (int j = -10; j < 10; ++j) {
+          for (const auto& [du, dv] : {std::pair(1, 0), std::pair(0, 1), std::pair(1, 1)}) {
+            const double h = 0.01, length = h * std::hypot(du, dv);
+            const double strain = (map((i + du) * h, (j + dv) * h) - map(i * h, j * h)).norm() / length - 1;
+            EXPECT_LE(strain, 1e-9);  // a chord is never longer than the line on the surface
+            worst = std::max(worst, -strain);
+          }
+        }
+      }
+      // smallest radius of curvature within the square: distance from the apex times the cone's tangent
+      const double sine = radius / std::abs(slant), tangent = sine < 1 ? sine / std::sqrt(1 - sine * sine) : 1e9;
+      const double curvature_radius = (0.5 - 0.1) * tangent;
+      EXPECT_LE(worst, std::pow(0.01 * std::sqrt(2) / curvature_radius, 2) / 24 * 1.05 + 1e-6) << radius << ' ' << slant;
+      // orientation: u across, v up, face side out
+      const Vector3d du = map(1e-5, 0) - map(0, 0), dv = map(0, 1e-5) - map(0, 0);
+      EXPECT_NEAR((du / 1e-5 - frame.across).norm(), 0, 1e-3);
+      EXPECT_NEAR((dv / 1e-5 - frame.up).norm(), 0, 1e-3);
+      EXPECT_GT(frame.out().dot(map(0, 0) - 0.5 * (map(0.1, 0) + map(-0.1, 0))), -1e-12);  // curls away from the face side
+    }
+  }
+}
+
+TEST(developable, section_is_the_parallel_curve_by_arc_length) {
+  Points2 square(4, 2);
+  square << 0.1, -0.2, 0.1, 0.2, -0.1, 0.2, -0.1, -0.2;
+  const double d = 0.03;
+  const ConvexSection section(square, d, {0, 0}, {1, 0});
+  EXPECT_NEAR(section.perimeter(), 1.2 + 2 * std::numbers::pi * d, 1e-12);
+  EXPECT_NEAR((section.point(0) - Vector2d(0.13, 0)).norm(), 0, 1e-9);
+  EXPECT_NEAR((section.point(section.perimeter()) - section.point(0)).norm(), 0, 1e-9);
+  EXPECT_NEAR((section.point(0.1) - Vector2d(0.13, 0.1)).norm(), 0, 1e-9);  // counter-clockwise
+  const double h = 1e-3;
+  for (double s = -0.3; s < 2; s += h) {
+    const double length = (section.point(s + h) - section.point(s)).norm();
+    EXPECT_LE(length, h * (1 + 1e-9));
+    EXPECT_GE(length, h * (1 - h * h / (d * d) / 20));
+    EXPECT_NEAR(section.normal(s).dot(section.point(s + 1e-7) - section.point(s)), 0, 1e-12);
+  }
+}
+
+// ---- the body
+
+TEST(body_frame, finds_levels_and_arms_of_a_dress_form_without_landmarks) {
+  mesh::SupportMesh bare = man();
+  const auto mark = [&](const char* name) { return Vector3d(man().landmarks.at(name)[0], man().landmarks.at(name)[1], man().landmarks.at(name)[2]); };
+  bare.landmarks.clear();
+  bare.girths.clear();
+  const auto frame = body_frame(bare);
+  ASSERT_TRUE(frame.has_value());
+  EXPECT_NEAR(frame->x_mid, 0, 2e-3);
+  EXPECT_NEAR(frame->waist, mark("waist_front").y(), 0.03);
+  EXPECT_NEAR(frame->section(mark("waist_front").y()).girth, 0.783, 0.01);
+  EXPECT_NEAR(frame->armpit, mark("armpit_left").y(), 0.03);
+  ASSERT_TRUE(frame->arm_left && frame->arm_right);
+  const Vector3d along = (mark("elbow_left") - mark("shoulder_left")).normalized();
+  EXPECT_GT(frame->arm_left->direction.dot(along), 0.97);
+  EXPECT_GT(frame->arm_left->direction.x(), 0.5);
+  EXPECT_LT(frame->arm_right->direction.x(), -0.5);
+  // biceps
+  double girth = 0;
+  for (const LimbPoint& point : frame->arm_left->points) girth = std::max(girth, point.girth * (point.centre.x() > 0.26));
+  EXPECT_NEAR(girth, 0.318, 0.03);
+  EXPECT_NEAR(*outline_top(bare, 0.15), *outline_top(bare, -0.15), 1e-3);
+}
+
+TEST(body_frame, refuses_what_is_no_body) {
+  mesh::SupportMesh beside = man();
+  // two separate lumps: nothing goes round the middle
+  const Eigen::Index n = beside.x.rows(), m = beside.faces.rows();
+  mesh::SupportMesh two = beside;
+  two.x.conservativeResize(2 * n, 3);
+  two.x.bottomRows(n) = beside.x;
+  two.x.topRows(n).col(0).array() += 1;
+  two.x.bottomRows(n).col(0).array() -= 1;
+  two.faces.conservativeResize(2 * m, 3);
+  two.faces.bottomRows(m) = beside.faces.array() + static_cast<int>(n);
+  const auto frame = body_frame(two);
+  ASSERT_FALSE(frame.has_value());
+  EXPECT_EQ(frame.issues().front().code, "no_trunk");
+}
+
+// ---- layout
+
+TEST(layout, sleeves_go_where_their_armholes_are) {
+  const auto g = boxy_tee();
+  const auto frame = body_frame(man());
+  const auto layout = make_layout(g, man(), *frame, {});
+  ASSERT_TRUE(layout.has_value());
+  EXPECT_EQ(layout->panels[0].region, Region::torso_front);
+  EXPECT_EQ(layout->panels[1].region, Region::torso_back);
+  EXPECT_EQ(layout->panels[2].region, Region::arm_right);
+  EXPECT_EQ(layout->panels[3].region, Region::arm_left);
+  EXPECT_NEAR(layout->girth_trunk, 2 * 0.56, 0.03);
+  EXPECT_NEAR(layout->girth_arm_left, 0.56, 0.02);
+  EXPECT_EQ(layout->shoulder_welds.size(), 12u);
+  // shoulders rest on the shoulders
+  const double top = layout->panels[0](Vector2d(0.5, 0.66)).y();
+  EXPECT_NEAR(top, *outline_top(man(), 0.17), 0.03);
+}
+
+TEST(layout, says_what_it_cannot_place) {
+  auto g = boxy_tee();
+  g.panels[1].name = g.panels[1].piece = "thing";
+  PlaceParams params;
+  params.panels["frnt"] = {};
+  const auto frame = body_frame(man());
+  const auto layout = make_layout(g, man(), *frame, params);
+  ASSERT_FALSE(layout.has_value());
+  EXPECT_EQ(codes(layout.issues()), (std::vector<std::string>{"unknown_panel", "no_region"}));
+  EXPECT_NE(layout.issues()[0].remedy.find("front"), std::string::npos);
+
+  PlaceParams anchors;
+  anchors.panels["front"].point = "tpo";
+  const auto bad_point = make_layout(boxy_tee(), man(), *frame, anchors);
+  ASSERT_FALSE(bad_point.has_value());
+  EXPECT_NE(bad_point.issues()[0].remedy.find("top"), std::string::npos);
+  anchors.panels["front"].point = "top";
+  anchors.panels["front"].at = "wiast";
+  const auto bad_mark = make_layout(boxy_tee(), man(), *frame, anchors);
+  ASSERT_FALSE(bad_mark.has_value());
+  EXPECT_NE(bad_mark.issues()[0].remedy.find("waist"), std::string::npos);
+  anchors.panels["front"].at = "waist";
+  const auto good = make_layout(boxy_tee(), man(), *frame, anchors);
+  ASSERT_TRUE(good.has_value());
+  EXPECT_NEAR(good->panels[0](Vector2d(0.1, 0.66)).y(), frame->waist, 1e-9);
+}
+
+// ---- coarse mesh
+
+TEST(coarse, keeps_area_seams_and_flat_states) {
+  const auto g = boxy_tee();
+  const CoarseGarment coarse = coarsen(g, 0.06);
+  EXPECT_LT(coarse.mesh.vertex_count(), g.vertex_count() / 4);
+  EXPECT_NEAR(mesh::rest_areas(coarse.mesh).sum(), mesh::rest_areas(g).sum(), 1e-9);
+  EXPECT_EQ(mesh::component_count(coarse.mesh.faces), 4);
+  EXPECT_EQ(mesh::euler_number(coarse.mesh.faces), 4);
+  std::vector<int> rows(g.seams.size(), 0);
+  for (const auto& weld : coarse.mesh.welds) ++rows[static_cast<std::size_t>(weld.seam)];
+  for (int count : rows) EXPECT_GE(count, 3);
+  const Points3 back = coarse.prolonged(coarse.restricted(g.x));
+  EXPECT_LT((back - g.x).cwiseAbs().maxCoeff(), 1e-12);
+}
+
+// ---- the whole
+
+TEST(place, tube_goes_round_the_hips_without_stretch) {
+  const auto g = tube(26, 15);  // 1.04 m round, 0.3 m high
+  PlaceParams params;
+  const auto placed = place(g, man(), params);
+  ASSERT_TRUE(placed.has_value());
+  const Report& report = placed->report;
+  EXPECT_TRUE(placed->findings.empty()) << to_string(placed->findings.front());
+  EXPECT_LE(report.max_strain, params.max_strain);
+  EXPECT_LE(report.rms_strain, params.rms_strain);
+  EXPECT_GE(report.smallest_gap, params.clearance);
+  EXPECT_EQ(report.self_intersections, 0);
+  EXPECT_EQ(report.support_intersections, 0);
+  EXPECT_LT(report.mean_seam_gap, 0.006);
+  EXPECT_EQ(placed->garment.welds.size(), g.welds.size());
+  // front in front, facing forwards
+  double front = 0, back = 0;
+  for (Eigen::Index v = 0; v < g.vertex_count(); ++v) (g.vertex_panel[v] == 0 ? front : back) += placed->garment.x(v, 2);
+  EXPECT_GT(front, back);
+}
+
+TEST(place, boxy_tee_hangs_on_the_shoulders_with_its_sleeves_over_the_arms) {
+  const auto g = boxy_tee();
+  const auto placed = place(g, man(), {});
+  ASSERT_TRUE(placed.has_value());
+  const Report& report = placed->report;
+  EXPECT_TRUE(placed->findings.empty()) << to_string(placed->findings.front());
+  EXPECT_EQ(report.vertices_inside, 0);
+  EXPECT_EQ(report.self_intersections, 0);
+  EXPECT_EQ(report.support_intersections, 0);
+  EXPECT_LT(report.mean_seam_gap, 0.02);
+  EXPECT_LT(seam_mean(report, g, "side_left"), 0.01);
+  EXPECT_LT(seam_mean(report, g, "underarm_left"), 0.02);
+  // each sleeve is round its arm: the arm's axis passes through it
+  const auto frame = body_frame(man());
+  for (const auto& [panel, arm] : {std::pair(2, frame->arm_right), std::pair(3, frame->arm_left)}) {
+    std::array<int, 4> quadrant{};
+    const Vector3d side = arm->direction.cross(Vector3d::UnitZ()).normalized();
+    for (Eigen::Index v = 0; v < g.vertex_count(); ++v) {
+      if (g.vertex_panel[v] != panel) continue;
+      const Vector3d d = placed->garment.x.row(v).transpose() - arm->origin;
+      ++quadrant[static_cast<std::size_t>((d.dot(side) > 0 ? 1 : 0) + (d.z() > 0 ? 2 : 0))];
+    }
+    for (int count : quadrant) EXPECT_GT(count, 20);
+  }
+}
+
+TEST(place, mirrored_body_and_garment_give_the_mirrored_result_in_its_figures) {
+  // mirrored form: faces turned over; boxy_tee is its own mirror image but for the names of its sleeves
+  mesh::SupportMesh mirrored = man();
+  mirrored.x.col(0) = -mirrored.x.col(0);
+  mirrored.faces.col(1).swap(mirrored.faces.col(2));
+  for (auto& [name, at] : mirrored.landmarks) at[0] = -at[0];
+  const auto frame = body_frame(man()), other = body_frame(mirrored);
+  EXPECT_NEAR((frame->arm_left->origin - Vector3d(-1, 1, 1).cwiseProduct(other->arm_right->origin)).norm(), 0, 1e-3);
+  const auto g = boxy_tee();
+  const auto a = place(g, man(), {}), b = place(g, mirrored, {});
+  ASSERT_TRUE(a.has_value() && b.has_value());
+  EXPECT_NEAR(a->report.mean_seam_gap, b->report.mean_seam_gap, 0.003);
+  EXPECT_NEAR(seam_mean(a->report, g, "shoulder_left"), seam_mean(b->report, g, "shoulder_right"), 0.006);
+}
+
+TEST(place, same_bytes_at_any_thread_count) {
+  const auto g = boxy_tee();
+  PlaceParams params;
+  params.closing_steps = 5, params.swelling_steps = 10, params.settling_steps = 5, params.polishing_steps = 5;
+  std::vector<std::string> bytes;
+  for (const int threads : {1, 2, 5}) {
+    set_thread_count(threads);
+    bytes.push_back(io::format_garment(place(g, man(), params)->garment, io::Encoding::binary));
+  }
+  set_thread_count(0);
+  EXPECT_EQ(bytes[0], bytes[1]);
+  EXPECT_EQ(bytes[0], bytes[2]);
+}
+
+TEST(place, says_when_panels_are_too_narrow) {
+  const auto placed = place(tube(20, 15), man(), {});  // 0.8 m round the hips of 0.93 m
+  ASSERT_FALSE(placed.has_value());
+  EXPECT_EQ(placed.issues().front().code, "too_narrow");
+  EXPECT_NE(placed.issues().front().what.find("front"), std::string::npos);
+}
+
+TEST(place, says_when_a_sleeve_is_too_narrow) {
+  auto g = boxy_tee();
+  // the left sleeve's pattern shrinks to half: 0.28 m round an arm of 0.32 m
+  for (Eigen::Index v = 0; v < g.vertex_count(); ++v) {
+    if (g.vertex_panel[v] == 3) g.uv(v, 0) *= 0.5;
+  }
+  const auto placed = place(g, man(), {});
+  ASSERT_FALSE(placed.has_value());
+  EXPECT_EQ(placed.issues().front().code, "too_narrow");
+  EXPECT_NE(placed.issues().front().what.find("sleeve_m"), std::string::npos);
+}
+
+TEST(place, says_when_there_is_no_arm) {
+  mesh::SupportMesh trunk = man();
+  form::Measurements m;
+  const auto frame = body_frame(trunk);
+  ASSERT_TRUE(frame.has_value());
+  BodyFrame armless = *frame;
+  armless.arm_left.reset();
+  const auto layout = make_layout(boxy_tee(), trunk, armless, {});
+  ASSERT_FALSE(layout.has_value());
+  EXPECT_EQ(layout.issues().front().code, "no_arm");
+  EXPECT_NE(layout.issues().front().place.item.find("sleeve_m"), std::string::npos);
+}
