@@ -1,0 +1,54 @@
+// Puts a sewn flat garment on a support.
+#include "toile/placement/place.h"
+#include "toile/stage/stage.h"
+
+#include <algorithm>
+
+namespace {
+
+using namespace toile;
+
+struct PlaceStage {
+  using Params = placement::PlaceParams;
+
+  static stage::Description description() {
+    return {.name = "toile-place",
+            .version = 1,
+            .summary = "Bends sewn flat panels around a body without stretching them and draws their seams together.",
+            .example = "toile-place layered.ply form.ply -o placed.ply",
+            .details = "Each panel goes on the trunk or on an arm, as its name and its seams say (front, back, waistband, sleeve), or as `panels` "
+                       "in the spec says. Panels are rolled round that part with every length kept, then drawn together by their seams while "
+                       "the body, flattened at first, swells between them. The seams that stay open close in the simulation; the summary lists "
+                       "them, with the largest edge strain, the smallest gap to the body and any intersections. The body needs no landmarks: "
+                       "waist, hips, armpits, shoulders and arms are found from its sections. docs/placement.md says how.",
+            .inputs = {{.name = "garment", .doc = "sewn garment (flat panels)", .kind = stage::FileKind::garment},
+                       {.name = "support", .doc = "body or dress form: closed, upright, facing +z, arms held away", .kind = stage::FileKind::support}},
+            .output = stage::FileKind::garment};
+  }
+
+  static Result<stage::Output> run(const Params& params, stage::Run& run) {
+    TOILE_TRY(const mesh::GarmentMesh garment, run.garment("garment"));
+    TOILE_TRY(const mesh::SupportMesh support, run.support("support"));
+    TOILE_TRY(placement::Placed placed, placement::place(garment, support, params, [&](double f) { run.progress(f, "placing"); }));
+    const placement::Report& report = placed.report;
+    run.report("max_edge_strain", report.max_strain);
+    run.report("rms_edge_strain", report.rms_strain);
+    run.report("area_change", report.area_change);
+    run.report("min_gap", report.smallest_gap, "m");
+    run.report("vertices_inside", report.vertices_inside);
+    run.report("support_intersections", report.support_intersections);
+    run.report("self_intersections", report.self_intersections);
+    run.report("mean_seam_gap", report.mean_seam_gap, "m");
+    run.report("max_seam_gap", report.largest_seam_gap, "m");
+    for (const placement::SeamGap& seam : report.seams) {
+      const std::string& name = garment.seams[static_cast<std::size_t>(seam.seam)].name;
+      run.report("mean_gap_" + name, seam.mean, "m");
+      run.report("max_gap_" + name, seam.largest, "m");
+    }
+    return stage::Output{std::move(placed.garment), std::move(placed.findings), {}};
+  }
+};
+
+}  // namespace
+
+int main(int argc, char** argv) { return toile::stage::run_main<PlaceStage>(argc, argv); }
