@@ -27,10 +27,10 @@ void Measurements::check_together(const Measurements& m, Issues& issues) {
   // Room for the arm between shoulder tip and armpit, estimated from the straight lengths.
   const double shoulder = 0.88 * m.hpsToWaistBack - std::tan(m.shoulderSlope) * (m.shoulderToShoulder / 2 - 0.16 * m.neck);
   const double depth = shoulder - m.waistToArmpit;
-  if (depth < 0.395 * m.biceps) {
+  if (depth < 0.38 * m.biceps) {
     issues.push_back(Issue{"implausible_measurement", {.item = "waistToArmpit"},
                            fmt::format("waistToArmpit of {} leaves {} between shoulder tip and armpit for an arm of {}", mm(m.waistToArmpit), mm(depth), mm(m.biceps)),
-                           fmt::format("expected at least {}; check waistToArmpit, hpsToWaistBack, shoulderSlope and biceps", mm(0.395 * m.biceps))});
+                           fmt::format("expected at least {}; check waistToArmpit, hpsToWaistBack, shoulderSlope and biceps", mm(0.38 * m.biceps))});
   }
   if (m.underbust) between("underbust", *m.underbust, 0.72 * m.chest, 1.0 * m.chest, "against the chest");
   if (m.waistToUnderbust) between("waistToUnderbust", *m.waistToUnderbust, 0.2 * m.waistToArmpit, 0.85 * m.waistToArmpit, "under the armpit");

@@ -136,7 +136,7 @@ Shape::Shape(const Measurements& m, const FormParams& params, const Tuning& tuni
   const double upper_chest = l.chest + 0.45 * (axilla - l.chest);
   if (male) {
     levels = {
-        {l.bottom - 0.03 * u, 0.176 * seat, 0.090 * seat, 0.086 * seat, 0.024 * u, 2.3, 2.3},
+        {l.bottom - 0.03 * u, 0.160 * seat, 0.086 * seat, 0.076 * seat, 0.024 * u, 2.3, 2.3},
         {under_seat, 0.187 * seat, 0.096 * seat, 0.102 * seat, 0.024 * u, 2.3, 2.3},
         {l.seat, 0.190 * seat, 0.100 * seat, 0.121 * seat, 0.023 * u, 2.3, 2.35},
         {l.hips, 0.180 * hips, 0.111 * hips, 0.127 * hips, 0.028 * u, 2.35, 2.35},
@@ -152,7 +152,7 @@ Shape::Shape(const Measurements& m, const FormParams& params, const Tuning& tuni
     };
   } else {
     levels = {
-        {l.bottom - 0.03 * u, 0.182 * seat, 0.088 * seat, 0.086 * seat, 0.020 * u, 2.25, 2.25},
+        {l.bottom - 0.03 * u, 0.164 * seat, 0.084 * seat, 0.076 * seat, 0.020 * u, 2.25, 2.25},
         {under_seat, 0.192 * seat, 0.092 * seat, 0.104 * seat, 0.018 * u, 2.25, 2.25},
         {l.seat, 0.193 * seat, 0.097 * seat, 0.122 * seat, 0.016 * u, 2.25, 2.3},
         {l.hips, 0.186 * hips, 0.110 * hips, 0.124 * hips, 0.022 * u, 2.25, 2.25},
@@ -325,7 +325,7 @@ double Shape::operator()(const Vector3d& p) const {
     const double below = std::max(levels_.chest + 0.02 * u - p.y(), 0.0);  // the plate ends under the armpit
     f = smooth_max(f, (q - plate_point_).dot(plate_normal_) - below * below / (0.05 * u), 0.022 * u);
   }
-  f = smooth_max(f, levels_.bottom - p.y(), 0.055 * u);
+  f = smooth_max(f, levels_.bottom - p.y(), 0.065 * u);
   // The neck's cap leans less than its base.
   const Vector3d cap(0, std::cos(0.2), std::sin(0.2));
   const double over = (p - Vector3d(0, levels_.top, centre_.at(levels_.top).f)).dot(cap);
