@@ -142,11 +142,24 @@ std::string number_label(double value, double step) {
   return text == "-0" ? "0" : text;
 }
 
-void draw_legend(Image& image, const ColorField& field, const std::array<double, 2>& scale) {
+void draw_legend(Image& image, const ColorField& field, const std::array<double, 2>& scale, const Srgb& background) {
   const double unit = std::min(image.width, image.height) / 900.0;
   const int bar_width = static_cast<int>(22 * unit), bar_height = static_cast<int>(0.42 * image.height);
   const int x0 = image.width - static_cast<int>(96 * unit), y0 = static_cast<int>(0.29 * image.height);
   const Srgb ink{0.2, 0.2, 0.22};
+  const double title_height = 15 * unit;
+  const double title_width = text_width(title_height, field.title);
+  const double title_x = std::max(4.0, image.width - 18 * unit - title_width);
+  // What lies behind the legend is faded, so that it can be read over a wide sleeve too.
+  const int panel_left = std::max(0, static_cast<int>(std::min<double>(x0, title_x) - 10 * unit));
+  for (int j = std::max(0, static_cast<int>(y0 - 50 * unit)); j < std::min(image.height, static_cast<int>(y0 + bar_height + 20 * unit)); ++j) {
+    for (int i = panel_left; i < image.width; ++i) {
+      for (int k = 0; k < 3; ++k) {
+        std::uint8_t& v = image.pixel(i, j)[k];
+        v = static_cast<std::uint8_t>(std::lround(0.25 * v + 0.75 * 255 * background[static_cast<std::size_t>(k)]));
+      }
+    }
+  }
   for (int j = 0; j < bar_height; ++j) {
     const double value = scale[1] + (scale[0] - scale[1]) * (j + 0.5) / bar_height;
     fill_rectangle(image, x0, y0 + j, x0 + bar_width, y0 + j + 1, field_color(field, scale, value));
@@ -165,9 +178,7 @@ void draw_legend(Image& image, const ColorField& field, const std::array<double,
     draw_stroke(image, right, y, right + 5 * unit, y, unit, ink);
     draw_text(image, right + 10 * unit, y + 0.5 * text_height, text_height, ink, number_label(scale[0] + i * step, resolution));
   }
-  const double title_height = 15 * unit;
-  const double width = text_width(title_height, field.title);
-  draw_text(image, std::max(4.0, image.width - 18 * unit - width), y0 - 24 * unit, title_height, ink, field.title);
+  draw_text(image, title_x, y0 - 24 * unit, title_height, ink, field.title);
 }
 
 /// Positions for the flat view: panels as cut, in rows, none on another. Returns where to write each panel's name.
@@ -257,6 +268,53 @@ void add_surface(RenderScene& scene, Surface surface, const mesh::Points3& x, co
     surface.normals.push_back(normals.row(v).cast<float>());
   }
   scene.surfaces.push_back(std::move(surface));
+}
+
+/// Cuts the surface along the plane through `point` and keeps what lies against `normal`.
+void keep_far_half(Surface& s, const Vector3f& point, const Vector3f& normal) {
+  std::vector<float> height;
+  for (const Vector3f& p : s.x) height.push_back((p - point).dot(normal));
+  std::map<std::pair<int, int>, int> cuts;
+  const auto cut = [&](int a, int b) {
+    const auto [it, inserted] = cuts.try_emplace(std::minmax(a, b), static_cast<int>(s.x.size()));
+    if (inserted) {
+      const auto [p, q] = std::pair(static_cast<std::size_t>(it->first.first), static_cast<std::size_t>(it->first.second));
+      const float t = height[p] / (height[p] - height[q]);
+      s.x.push_back((1 - t) * s.x[p] + t * s.x[q]);
+      s.normals.push_back(((1 - t) * s.normals[p] + t * s.normals[q]).normalized());
+      if (!s.colors_on_faces && s.colors.size() > 1) s.colors.push_back((1 - t) * s.colors[p] + t * s.colors[q]);
+      s.vertex_lines.push_back(EdgeLine::none);
+    }
+    return it->second;
+  };
+  decltype(s.faces) faces;
+  decltype(s.lines) lines;
+  decltype(s.colors) colors;
+  for (std::size_t f = 0; f < s.faces.size(); ++f) {
+    std::vector<int> corner;     // of what is left of the face
+    std::vector<EdgeLine> line;  // of the edge that follows each corner
+    for (std::size_t k = 0; k < 3; ++k) {
+      const int a = s.faces[f][k], b = s.faces[f][(k + 1) % 3];
+      const bool keep_a = height[static_cast<std::size_t>(a)] <= 0, keep_b = height[static_cast<std::size_t>(b)] <= 0;
+      const EdgeLine along = s.lines[f][(k + 2) % 3];
+      if (keep_a) {
+        corner.push_back(a);
+        line.push_back(along);
+      }
+      if (keep_a != keep_b) {
+        corner.push_back(cut(a, b));
+        line.push_back(keep_a ? EdgeLine::none : along);
+      }
+    }
+    for (std::size_t k = 1; k + 1 < corner.size(); ++k) {
+      faces.push_back({corner[0], corner[k], corner[k + 1]});
+      lines.push_back({line[k], k + 2 == corner.size() ? line[k + 1] : EdgeLine::none, k == 1 ? line[0] : EdgeLine::none});
+      if (s.colors_on_faces) colors.push_back(s.colors[f]);
+    }
+  }
+  s.faces = std::move(faces);
+  s.lines = std::move(lines);
+  if (s.colors_on_faces) s.colors = std::move(colors);
 }
 
 }  // namespace
@@ -368,19 +426,11 @@ Result<Image> draw_picture(const PictureParams& params, const mesh::GarmentMesh*
       }
     }
     const Vector3d centre = 0.5 * (cloth_x.colwise().minCoeff() + cloth_x.colwise().maxCoeff()).transpose();
-    std::vector<Vector3f> kept_colors;
-    for (Eigen::Index f = 0; f < g.face_count(); ++f) {
-      if (inside) {
-        const Vector3d middle = (cloth_x.row(g.faces(f, 0)) + cloth_x.row(g.faces(f, 1)) + cloth_x.row(g.faces(f, 2))).transpose() / 3;
-        // Depth along the level direction of view: the near half is left out.
-        if ((middle - centre).dot(Vector3d(toward.x(), 0, toward.z())) > 0) continue;
-      }
-      surface.faces.push_back({g.faces(f, 0), g.faces(f, 1), g.faces(f, 2)});
-      surface.lines.push_back(lines[static_cast<std::size_t>(f)]);
-      if (surface.colors_on_faces) kept_colors.push_back(surface.colors[static_cast<std::size_t>(f)]);
-    }
-    if (surface.colors_on_faces) surface.colors = std::move(kept_colors);
+    for (Eigen::Index f = 0; f < g.face_count(); ++f) surface.faces.push_back({g.faces(f, 0), g.faces(f, 1), g.faces(f, 2)});
+    surface.lines = lines;
     add_surface(scene, std::move(surface), cloth_x, cloth_normals(g, cloth_x));
+    // Depth along the level direction of view: the near half is left out.
+    if (inside) keep_far_half(scene.surfaces.back(), centre.cast<float>(), Vector3f(static_cast<float>(toward.x()), 0, static_cast<float>(toward.z())));
   }
   if (support != nullptr) {
     Surface surface;
@@ -444,7 +494,7 @@ Result<Image> draw_picture(const PictureParams& params, const mesh::GarmentMesh*
     const std::string& name = garment->panels[p].name;
     draw_text(*image, q.x() - 0.5 * text_width(height, name), -q.y() + height, height, {0.25, 0.25, 0.28}, name);
   }
-  if (field) draw_legend(*image, *field, scale);
+  if (field) draw_legend(*image, *field, scale, params.background);
   return image;
 }
 
