@@ -215,7 +215,10 @@ SolveReport LinearSolver::solve(const BlockMatrix& matrix, const std::vector<Con
   while (report.iterations < options.max_iterations) {
     multiply(matrix, terms, p_, q_);
     const double curvature = dot(p_, q_);
-    if (!(curvature > 0)) break;  // rounding has used up the search space
+    if (!(curvature > 0)) {  // rounding has used up the search space, or the matrix bends down this way
+      if (report.iterations == 0) x = p_;
+      break;
+    }
     const Float4 alpha = splat(static_cast<float>(rho / curvature));
     parallel_for(n, grain, [&](std::size_t i) {
       x[i] += alpha * p_[i];

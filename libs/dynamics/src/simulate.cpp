@@ -28,6 +28,12 @@ const Points3 no_points(0, 3);
 // little, the next iteration takes that back; forbidding it makes the steps several times shorter.
 constexpr double energy_slack = 1e-3;
 constexpr double solver_tolerance = 0.02;
+constexpr int solver_iterations_max = 300;
+// Relaxation: part of the last move that the next step starts with (until the energy rises), and the step's control.
+constexpr double momentum = 0.95;
+constexpr double step_max = 2;        // [s]
+constexpr double quiet_move = 2e-4;   // below it the step grows [m]
+constexpr double solved_well = 0.25;  // part of the net force left after one iteration, below it the step grows
 
 /// Node ids: vertices whose welds are closed share one.
 Ids node_ids(const GarmentMesh& garment, const std::vector<char>& weld_closed) {
@@ -125,7 +131,7 @@ class Run {
   std::vector<ContactTerm> terms_;
   LinearSolver solver_;
   SolveReport solve_report_;
-  double last_move_ = 0, last_fraction_ = 1, last_alpha_ = 1;
+  double last_total_ = 1e300, last_left_ = 0, last_move_ = 0, last_fraction_ = 1, last_alpha_ = 1;
   std::vector<Float4> rhs_, direction_;
 };
 
@@ -279,7 +285,7 @@ bool Run::iterate(double step) {
   const double before = energy_ + inertia_energy(x_);
   phase("solve");
   solver_.factor(response_.matrix, terms_);
-  solve_report_ = solver_.solve(response_.matrix, terms_, rhs_, direction_, {.tolerance = solver_tolerance, .max_iterations = 300});
+  solve_report_ = solver_.solve(response_.matrix, terms_, rhs_, direction_, {.tolerance = solver_tolerance, .max_iterations = solver_iterations_max});
   report_.solver_iterations += solve_report_.iterations;
   ++report_.iterations;
   phase("limit");
@@ -313,6 +319,8 @@ bool Run::iterate(double step) {
     }
   }
   last_alpha_ = alpha;
+  const Points3 left = gradient_ + inverse_sq * (sheet_.mass.asDiagonal() * (x_ - inertia_));
+  last_left_ = left.rowwise().norm().sum() / std::max(weight_, 1e-12);
   last_move_ = (x_ - from).rowwise().norm().maxCoeff();
   return moved;
 }
@@ -320,8 +328,14 @@ bool Run::iterate(double step) {
 /// The step is over: friction takes note, the next step starts here.
 void Run::accept() {
   friction_ = update_friction(friction_, start_, contacts_, x_, support_x_, sheet_.area, laws_);
+  const double total = energy_ - friction_energy_;
+  if (total <= last_total_) {
+    inertia_ = x_ + momentum * (x_ - start_);
+  } else {
+    inertia_ = x_;
+  }
+  last_total_ = total;
   start_ = x_;
-  inertia_ = x_;
 }
 
 void Run::log_row(const char* phase_name) {
@@ -366,6 +380,8 @@ void Run::close_seams() {
   for (int i = 1; i <= limit && !interrupted(); ++i) {
     const double part = std::max(0.0, 1 - static_cast<double>(i) / params_.closing_steps);
     link_offset_ = part * link_start_;
+    // Sides that do not meet by now are pulled harder and harder.
+    if (i > params_.closing_steps + 5) mechanics::scale_links(sheet_, 1.25);
     evaluate(x_, true);
     iterate(step_);
     log_row("closing");
@@ -400,7 +416,7 @@ void Run::relax() {
   inertia_ = start_ = x_;
   link_offset_.setZero();
   evaluate(x_, true);
-  double best = static_residual();
+  double before = static_residual();
   for (int i = 0; i < params_.max_iterations && !interrupted(); ++i) {
     iterate(step_);
     accept();
@@ -408,16 +424,18 @@ void Run::relax() {
     evaluate(x_, true);
     const double residual = static_residual();
     log_row("relaxing");
-    best = std::min(best, residual);
     if (hooks_.progress) hooks_.progress(std::clamp(0.2 + 0.8 * std::log(residual / 10) / std::log(params_.residual / 10), 0.2, 1.0), fmt::format("iteration {}, residual {:.2e}", report_.iterations, residual));
     if (residual <= params_.residual) {
       report_.converged = true;
       break;
     }
-    if (last_alpha_ == 1 && last_fraction_ > 0.5) {
-      step_ = std::min(step_ * 1.3, 2.0);
-    } else if (last_alpha_ < 0.5) {
-      step_ = std::max(step_ * 0.5, params_.time_step / 16);
+    // How well one iteration solved its step: what is left of the step's own net force.
+    const double left = last_left_ / before;
+    before = residual;
+    if (last_alpha_ < 0.5) {
+      step_ = std::max(0.7 * step_, params_.time_step / 8);
+    } else if (left < solved_well || last_move_ < quiet_move) {
+      step_ = std::min(1.4 * step_, step_max);
     }
   }
   report_.residual = static_residual();

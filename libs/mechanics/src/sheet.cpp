@@ -278,6 +278,21 @@ Result<Sheet> make_sheet(const mesh::GarmentMesh& garment, const Ids& node_of_ve
   return sheet;
 }
 
+void scale_links(Sheet& sheet, double factor) {
+  const auto add = [&](int i, int j, double value) {
+    const auto begin = sheet.column.begin() + sheet.row_start[static_cast<std::size_t>(i)], end = sheet.column.begin() + sheet.row_start[static_cast<std::size_t>(i) + 1];
+    sheet.constant_part[static_cast<std::size_t>(std::lower_bound(begin, end, j) - sheet.column.begin())] += value;
+  };
+  for (Link& link : sheet.links) {
+    const double more = (factor - 1) * link.stiffness;
+    link.stiffness += more;
+    add(link.a, link.a, more);
+    add(link.b, link.b, more);
+    add(link.a, link.b, -more);
+    add(link.b, link.a, -more);
+  }
+}
+
 SheetEnergy energy(const Sheet& sheet, const Points3& x, const Points3& link_offset) {
   SheetEnergy result;
   const auto add = [](double a, double b) { return a + b; };

@@ -66,6 +66,9 @@ struct Sheet {
 /// error  "no_laminate" for each panel with a face that has no laminate, "bad_fabric", "degenerate_triangle"
 Result<Sheet> make_sheet(const mesh::GarmentMesh& garment, const Ids& node_of_vertex, const SheetOptions& options);
 
+/// Makes all links stiffer by a factor.
+void scale_links(Sheet& sheet, double factor);
+
 /// Energies by kind [J].
 struct SheetEnergy {
   double membrane = 0, bending = 0, links = 0;
