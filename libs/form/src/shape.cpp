@@ -250,7 +250,7 @@ Shape::Shape(const Measurements& m, const FormParams& params, const Tuning& tuni
     Breast b;
     b.x = m.bustSpan.value_or(0.185 * m.chest) / 2 + tuning.bust_out;
     b.y = l.bust - 0.004 * u;
-    b.inner = 0.064 * u, b.outer = 0.080 * u, b.upper = 0.090 * u, b.lower = 0.060 * u;
+    b.inner = 0.074 * u, b.outer = 0.082 * u, b.upper = 0.100 * u, b.lower = 0.064 * u;
     b.height = std::max(0.004 * u, 0.042 * u * (1 + 3 * (tuning.chest - 1)));
     breast_ = b;
   }
@@ -302,7 +302,7 @@ double Shape::operator()(const Vector3d& p) const {
       const double wx = breast_->inner + (breast_->outer - breast_->inner) * frontness(dx, 0.02 * u);
       const double wy = breast_->lower + (breast_->upper - breast_->lower) * frontness(dy, 0.02 * u);
       const double r_sq = dx * dx / (wx * wx) + dy * dy / (wy * wy);
-      return r_sq > 9 ? 0.0 : std::exp(-std::pow(r_sq, 1.4));
+      return r_sq > 9 ? 0.0 : std::exp(-std::pow(r_sq, 1.25));
     };
     const double fore = frontness(p.z() - centre_.at(p.y()).f - 0.02 * u, 0.03 * u);
     f = torso({p.x(), p.y(), p.z() - breast_->height * (one(1) + one(-1)) * fore});
