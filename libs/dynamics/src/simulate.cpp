@@ -33,6 +33,7 @@ constexpr int solver_iterations_max = 300;
 constexpr double momentum = 0.95;
 constexpr double step_max = 2;        // [s]
 constexpr double quiet_move = 2e-4;   // below it the step grows [m]
+constexpr int stall_limit = 30;       // iterations without a better residual
 constexpr double solved_well = 0.25;  // part of the net force left after one iteration, below it the step grows
 
 /// Node ids: vertices whose welds are closed share one.
@@ -416,7 +417,8 @@ void Run::relax() {
   inertia_ = start_ = x_;
   link_offset_.setZero();
   evaluate(x_, true);
-  double before = static_residual();
+  double before = static_residual(), best = before;
+  int stalled = 0;
   for (int i = 0; i < params_.max_iterations && !interrupted(); ++i) {
     iterate(step_);
     accept();
@@ -432,8 +434,19 @@ void Run::relax() {
     // How well one iteration solved its step: what is left of the step's own net force.
     const double left = last_left_ / before;
     before = residual;
-    if (last_alpha_ < 0.5) {
+    if (residual < 0.95 * best) {
+      best = residual;
+      stalled = 0;
+    } else {
+      ++stalled;
+    }
+    if (last_alpha_ < 0.5 || residual > 4 * best) {
       step_ = std::max(0.7 * step_, params_.time_step / 8);
+    } else if (stalled >= stall_limit) {
+      // Nothing gained for long: begin again with a short step.
+      step_ = std::max(0.2 * step_, params_.time_step / 4);
+      best = residual;
+      stalled = 0;
     } else if (left < solved_well || last_move_ < quiet_move) {
       step_ = std::min(1.4 * step_, step_max);
     }
