@@ -346,7 +346,7 @@ Result<Placed> place(const mesh::GarmentMesh& garment, const mesh::SupportMesh& 
   options.flattening.depth = 1;
   options.closing_steps = 0;
   options.swelling_steps = 0;
-  options.settling_steps = 1;
+  options.settling_steps = params.fine_steps;
   options.progress = [&](double f) {
     if (progress) progress(0.5 + 0.5 * f);
   };

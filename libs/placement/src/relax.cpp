@@ -19,6 +19,8 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr int kSubsteps = 8;        // between two searches for contacts
+// Momentum (heavy ball): without it the long waves of stretch take tens of times as many sweeps.
+constexpr double kCoast = 0.95;
 constexpr double kSpeed = 0.001;    // a vertex coasts at most so far in a substep [m]
 constexpr double kSeamMove = 0.004; // a seam draws a vertex at most so far in a sweep [m]
 constexpr double kClosed = 0.02;    // a seam that starts with a gap below this is held firmly: no limb gets through it [m]
@@ -82,21 +84,21 @@ class Relaxation {
       if (options_.progress) options_.progress(static_cast<double>(++done) / std::max(total, 1));
     };
     const double s0 = options_.flattening.depth, seam = options_.seam, bending = options_.bending;
-    for (int i = 0; i < options_.closing_steps; ++i, tell()) step(s0, {.sweeps = 3, .seam = seam, .closed_seam = kClosedSeam, .bending = bending, .coast = 0.92});
+    for (int i = 0; i < options_.closing_steps; ++i, tell()) step(s0, {.sweeps = 3, .seam = seam, .closed_seam = kClosedSeam, .bending = bending});
     for (int i = 0; i < options_.swelling_steps; ++i, tell()) {
       const double f = static_cast<double>(i + 1) / options_.swelling_steps;
-      step(s0 + (1 - s0) * f, {.sweeps = 3, .seam = seam, .closed_seam = kClosedSeam, .bending = bending, .coast = 0.9});
+      step(s0 + (1 - s0) * f, {.sweeps = 3, .seam = seam, .closed_seam = kClosedSeam, .bending = bending});
     }
     for (int i = 0; i < options_.settling_steps; ++i, tell()) {
       const double rest = 1 - static_cast<double>(i + 1) / options_.settling_steps;
-      step(1, {.sweeps = 4, .seam = seam * rest, .closed_seam = kClosedSeam * rest, .bending = bending * rest, .coast = 0.8 * rest});
+      step(1, {.sweeps = 4, .seam = seam * rest, .closed_seam = kClosedSeam * rest, .bending = bending * rest});
     }
     for (int i = 0; i < options_.polishing_steps; ++i, tell()) {
       if (i % 5 == 0) {
         const StrainSummary strain = own_strain();
         if (strain.largest <= options_.max_strain && strain.rms <= options_.rms_strain) break;
       }
-      step(1, {.sweeps = 4, .seam = 0, .closed_seam = 0, .bending = 0, .coast = 0});
+      step(1, {.sweeps = 4, .seam = 0, .closed_seam = 0, .bending = 0});
     }
     return x_;
   }
@@ -120,7 +122,7 @@ class Relaxation {
 
   struct Step {
     int sweeps;
-    double seam, closed_seam, bending, coast;
+    double seam, closed_seam, bending;
   };
 
   Bend make_bend(const mesh::Edge& edge) const {
@@ -270,7 +272,7 @@ class Relaxation {
     const Points3 start = x_;
     for (int k = 0; k < kSubsteps; ++k) {
       before_ = x_;
-      if (step.coast > 0) x_ += step.coast * v_;
+      x_ += kCoast * v_;
       for (int j = 0; j < step.sweeps; ++j) sweep(step, (j + k) % 2 == 0);
       v_ = x_ - before_;
       for (Eigen::Index i = 0; i < v_.rows(); ++i) {

@@ -63,11 +63,12 @@ struct PlaceParams {
   std::optional<double> flatten;
   double thickness = 0.001;
   double coarse = 0.03;
-  double seam = 0.05;
+  double seam = 0.1;
   double bending = 0.1;
   int closing_steps = 60;
   int swelling_steps = 80;
   int settling_steps = 60;
+  int fine_steps = 20;
   int polishing_steps = 200;
   std::map<std::string, PanelSpec> panels;
   static void describe(auto& f) {
@@ -83,6 +84,7 @@ struct PlaceParams {
     f(&PlaceParams::closing_steps, {.key = "closing_steps", .doc = "relaxation steps while the seams close on the flattened support", .min = 0, .max = 10000});
     f(&PlaceParams::swelling_steps, {.key = "swelling_steps", .doc = "steps while the support takes its true depth", .min = 1, .max = 10000});
     f(&PlaceParams::settling_steps, {.key = "settling_steps", .doc = "steps on the true support, over which the seams let go", .min = 1, .max = 10000});
+    f(&PlaceParams::fine_steps, {.key = "fine_steps", .doc = "steps on the fine mesh over which its seams close once more and let go", .min = 1, .max = 10000});
     f(&PlaceParams::polishing_steps, {.key = "polishing_steps", .doc = "most steps in which stretch is taken out", .min = 0, .max = 100000});
     f(&PlaceParams::panels, {.key = "panels", .doc = "settings of single panels, by name"});
     f.check([](const PlaceParams& p, Issues& issues) {
