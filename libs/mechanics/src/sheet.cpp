@@ -58,9 +58,94 @@ std::array<Eigen::Vector2d, 3> corners_uv(const mesh::GarmentMesh& garment, Eige
   return {garment.uv.row(garment.faces(f, 0)).transpose(), garment.uv.row(garment.faces(f, 1)).transpose(), garment.uv.row(garment.faces(f, 2)).transpose()};
 }
 
-/// Bending of all triangles as one scalar matrix: curvature of a triangle from the jumps of the surface's slope over its
+/// weight/2 |sum_i coefficient_i x_(node_i)|^2 as contributions to the matrix.
+void add_square(const std::vector<std::pair<int, double>>& form, double weight, std::vector<Triplet>& triplets) {
+  for (const auto& [i, p] : form) {
+    for (const auto& [j, q] : form) triplets.push_back({i, j, weight * p * q});
+  }
+}
+
+/// Bending of rectangular grid cells by second differences along the yarns at their corners and the twist of the cell.
+/// Returns which faces are done that way: both halves of a rectangle along the yarns whose corners are free of seams and either
+/// inside the grid or on a border along a yarn (there the moment across the border vanishes and needs no term).
+std::vector<char> grid_bending_triplets(const mesh::GarmentMesh& garment, const Sheet& sheet, std::vector<Triplet>& triplets) {
+  const auto nv = static_cast<std::size_t>(garment.vertex_count());
+  std::vector<char> done(sheet.corners.size(), 0);
+  std::vector<int> sharing(static_cast<std::size_t>(sheet.node_count), 0);
+  for (Eigen::Index v = 0; v < garment.vertex_count(); ++v) ++sharing[static_cast<std::size_t>(sheet.node_of_vertex[v])];
+  std::vector<double> angle(nv, 0);
+  for (Eigen::Index f = 0; f < garment.face_count(); ++f) {
+    for (int k = 0; k < 3; ++k) {
+      const Eigen::RowVector2d o = garment.uv.row(garment.faces(f, k));
+      const Eigen::RowVector2d p = garment.uv.row(garment.faces(f, (k + 1) % 3)) - o, q = garment.uv.row(garment.faces(f, (k + 2) % 3)) - o;
+      angle[static_cast<std::size_t>(garment.faces(f, k))] += std::atan2(std::abs(p.x() * q.y() - p.y() * q.x()), p.dot(q));
+    }
+  }
+  constexpr double aligned = 1e-6;
+  // Neighbours along +u, -u, +v, -v.
+  std::vector<std::array<int, 4>> next(nv, {-1, -1, -1, -1});
+  const std::vector<mesh::Edge> edges = mesh::edges(garment.faces);
+  for (const mesh::Edge& edge : edges) {
+    const Eigen::RowVector2d d = garment.uv.row(edge.b) - garment.uv.row(edge.a);
+    const auto a = static_cast<std::size_t>(edge.a), b = static_cast<std::size_t>(edge.b);
+    if (std::abs(d.y()) < aligned * std::abs(d.x())) {
+      next[a][d.x() > 0 ? 0 : 1] = edge.b;
+      next[b][d.x() > 0 ? 1 : 0] = edge.a;
+    } else if (std::abs(d.x()) < aligned * std::abs(d.y())) {
+      next[a][d.y() > 0 ? 2 : 3] = edge.b;
+      next[b][d.y() > 0 ? 3 : 2] = edge.a;
+    }
+  }
+  const auto regular = [&](int vertex) {
+    const auto v = static_cast<std::size_t>(vertex);
+    if (sharing[static_cast<std::size_t>(sheet.node_of_vertex[vertex])] != 1) return false;
+    const double quarters = angle[v] / (0.5 * M_PI);
+    const auto whole = static_cast<int>(std::lround(quarters));
+    if (std::abs(quarters - whole) > 1e-6 || whole == 3) return false;
+    const auto count = static_cast<int>(std::count_if(next[v].begin(), next[v].end(), [](int n) { return n >= 0; }));
+    return count == (whole == 4 ? 4 : whole + 1);
+  };
+  const auto node = [&](int vertex) { return sheet.node_of_vertex[vertex]; };
+  for (const mesh::Edge& edge : edges) {
+    if (edge.faces.size() != 2) continue;
+    const auto f = static_cast<std::size_t>(edge.faces[0]), g = static_cast<std::size_t>(edge.faces[1]);
+    if (sheet.fabric_of_face[f] != sheet.fabric_of_face[g]) continue;
+    const auto opposite = [&](int face) {
+      for (int k = 0; k < 3; ++k) {
+        const int v = garment.faces(face, k);
+        if (v != edge.a && v != edge.b) return v;
+      }
+      return -1;
+    };
+    const int c = opposite(edge.faces[0]), d = opposite(edge.faces[1]);
+    const Eigen::RowVector2d a = garment.uv.row(edge.a), b = garment.uv.row(edge.b), size = (b - a).cwiseAbs();
+    const double tolerance = aligned * size.maxCoeff();
+    if (size.minCoeff() < 0.05 * size.maxCoeff()) continue;
+    const auto at = [&](int v, double u, double w) { return (garment.uv.row(v) - Eigen::RowVector2d(u, w)).norm() < tolerance; };
+    if (!((at(c, a.x(), b.y()) && at(d, b.x(), a.y())) || (at(d, a.x(), b.y()) && at(c, b.x(), a.y())))) continue;
+    const std::array<int, 4> corner{edge.a, edge.b, c, d};
+    if (!std::all_of(corner.begin(), corner.end(), regular)) continue;
+    done[f] = done[g] = 1;
+    const double area = size.x() * size.y();
+    const fabric::Constitutive& fabric = sheet.fabrics[static_cast<std::size_t>(sheet.fabric_of_face[f])];
+    for (int v : corner) {
+      for (int axis = 0; axis < 2; ++axis) {
+        const int after = next[static_cast<std::size_t>(v)][static_cast<std::size_t>(2 * axis)], before = next[static_cast<std::size_t>(v)][static_cast<std::size_t>(2 * axis + 1)];
+        if (after < 0 || before < 0) continue;
+        const double p = garment.uv(after, axis) - garment.uv(v, axis), q = garment.uv(v, axis) - garment.uv(before, axis);
+        const double scale = 2 / (p + q);
+        add_square({{node(after), scale / p}, {node(before), scale / q}, {node(v), -scale * (1 / p + 1 / q)}}, 0.25 * area * (axis == 0 ? fabric.bending_weft : fabric.bending_warp), triplets);
+      }
+    }
+    const double twist = 1 / area;
+    add_square({{node(edge.a), twist}, {node(edge.b), twist}, {node(c), -twist}, {node(d), -twist}}, 4 * fabric.bending_twist * area, triplets);
+  }
+  return done;
+}
+
+/// Bending of the other triangles: curvature of a triangle from the jumps of the surface's slope over its
 /// edges, docs/mechanics.md#bending.
-void bending_triplets(const mesh::GarmentMesh& garment, const Sheet& sheet, const std::map<std::pair<int, int>, double>& seam_factor, std::vector<Triplet>& triplets) {
+void bending_triplets(const mesh::GarmentMesh& garment, const Sheet& sheet, const std::map<std::pair<int, int>, double>& seam_factor, const std::vector<char>& skip, std::vector<Triplet>& triplets) {
   mesh::Triangles faces(garment.face_count(), 3);
   for (Eigen::Index f = 0; f < faces.rows(); ++f) {
     for (int k = 0; k < 3; ++k) faces(f, k) = sheet.corners[static_cast<std::size_t>(f)][static_cast<std::size_t>(k)];
@@ -91,6 +176,7 @@ void bending_triplets(const mesh::GarmentMesh& garment, const Sheet& sheet, cons
     }
   }
   for (std::size_t f = 0; f < sheet.corners.size(); ++f) {
+    if (skip[f]) continue;
     const TriangleShape& shape = sheet.shapes[f];
     const auto uv = corners_uv(garment, static_cast<Eigen::Index>(f));
     std::vector<int> nodes(sheet.corners[f].begin(), sheet.corners[f].end());
@@ -225,7 +311,8 @@ Result<Sheet> make_sheet(const mesh::GarmentMesh& garment, const Ids& node_of_ve
   }
 
   std::vector<Triplet> triplets;
-  bending_triplets(garment, sheet, seam_factor, triplets);
+  const std::vector<char> on_grid = grid_bending_triplets(garment, sheet, triplets);
+  bending_triplets(garment, sheet, seam_factor, on_grid, triplets);
   sheet.bending = compress(sheet.node_count, triplets);
 
   // The block pattern: bending stencils hold those of the membrane except at lone triangles, so all are joined.
