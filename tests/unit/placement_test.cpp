@@ -421,7 +421,7 @@ TEST(place, says_when_panels_are_too_narrow) {
   const auto placed = place(tube(20, 15), man(), {});  // 0.8 m round the hips of 0.93 m
   ASSERT_FALSE(placed.has_value());
   EXPECT_EQ(placed.issues().front().code, "too_narrow");
-  EXPECT_NE(placed.issues().front().what.find("front"), std::string::npos);
+  EXPECT_NE(placed.issues().front().place.item.find("front"), std::string::npos);
 }
 
 TEST(place, says_when_a_sleeve_is_too_narrow) {
@@ -433,7 +433,7 @@ TEST(place, says_when_a_sleeve_is_too_narrow) {
   const auto placed = place(g, man(), {});
   ASSERT_FALSE(placed.has_value());
   EXPECT_EQ(placed.issues().front().code, "too_narrow");
-  EXPECT_NE(placed.issues().front().what.find("sleeve_m"), std::string::npos);
+  EXPECT_NE(placed.issues().front().place.item.find("sleeve_m"), std::string::npos);
 }
 
 TEST(place, says_when_there_is_no_arm) {

@@ -82,7 +82,7 @@ std::string names_of(const mesh::GarmentMesh& garment, const std::vector<int>& p
 
 Issue too_narrow(const mesh::GarmentMesh& garment, const std::vector<int>& panels, double width, double needed, const std::string& where) {
   return Issue{.code = "too_narrow", .place = {.item = panels.size() == 1 ? "panel " + names_of(garment, panels) : "panels " + names_of(garment, panels)},
-               .what = fmt::format("{} measure{} {:.0f} mm round, but {} needs {:.0f} mm with the clearance", names_of(garment, panels), panels.size() == 1 ? "s" : "",
+               .what = fmt::format("{} {:.0f} mm round, but {} needs {:.0f} mm with the clearance", panels.size() == 1 ? "it measures" : "sewn together they measure",
                                    1e3 * width, where, 1e3 * needed),
                .remedy = "use a larger size of the pattern or a smaller support", .category = Category::input};
 }
