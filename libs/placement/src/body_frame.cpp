@@ -276,15 +276,22 @@ Result<BodyFrame> body_frame(const mesh::SupportMesh& support) {
   // Waist, hips, chest from the girths of the free trunk.
   const double trunk_low = frame.crotch, trunk_high = frame.armpit;
   frame.waist = 0.5 * (trunk_low + trunk_high);
+  double waist_low = trunk_low + 0.25 * (trunk_high - trunk_low), waist_high = trunk_high - 0.1 * (trunk_high - trunk_low);
+  if (const auto it = frame.landmarks.find("waist_front"); it != frame.landmarks.end()) {
+    // A form knows where its waist is; cloth hangs from the narrowest place near it. (Without arms there is no armpit to end
+    // the trunk, and the neck would be taken for the narrowest place.)
+    waist_low = it->second.y() - 0.06;
+    waist_high = it->second.y() + 0.06;
+    frame.waist = it->second.y();
+  }
   double smallest = 1e9;
   for (const Section& section : frame.sections) {
-    if (section.y < trunk_low + 0.25 * (trunk_high - trunk_low) || section.y > trunk_high - 0.1 * (trunk_high - trunk_low)) continue;
+    if (section.y < waist_low || section.y > waist_high) continue;
     if (section.girth < smallest) {
       smallest = section.girth;
       frame.waist = section.y;
     }
   }
-  if (const auto it = frame.landmarks.find("waist"); it != frame.landmarks.end()) frame.waist = it->second.y();
   frame.hips = trunk_low;
   double largest = 0;
   for (const Section& section : frame.sections) {
