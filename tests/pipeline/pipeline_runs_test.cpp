@@ -34,7 +34,7 @@ class pipeline_runs : public testing::Test {
     const fs::path source = TOILE_SOURCE_DIR;
     fs::copy(source / "samples", root / "samples", fs::copy_options::recursive);
     fs::copy(source / "pipelines" / "tee", root / "pipelines" / "tee", fs::copy_options::recursive);
-    replace("mesh.yaml", "cell: 10 mm", "cell: 35 mm");
+    replace("mesh.yaml", "cell: 10 mm", "cell: 20 mm");
   }
   void replace(const std::string& file, const std::string& from, const std::string& to) {
     const std::string path = (root / "pipelines" / "tee" / file).string();
@@ -95,7 +95,7 @@ TEST_F(pipeline_runs, a_run_killed_anywhere_and_started_again_gives_the_same_byt
     }
     ::setpgid(child, child);
     // Longer at each attempt, so that every stage is hit on its way.
-    std::this_thread::sleep_for(std::chrono::milliseconds(60 + 90 * attempt));
+    std::this_thread::sleep_for(std::chrono::milliseconds(60 + 260 * attempt));
     int status = 0;
     if (::waitpid(child, &status, WNOHANG) == child) break;
     ::kill(-child, SIGKILL);

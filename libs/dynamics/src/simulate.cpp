@@ -132,6 +132,7 @@ class Run {
   std::vector<ContactTerm> terms_;
   LinearSolver solver_;
   SolveReport solve_report_;
+  double momentum_ = momentum, tolerance_ = solver_tolerance, slack_ = energy_slack;  // sharper once the relaxation stalls
   double last_total_ = 1e300, last_left_ = 0, last_move_ = 0, last_fraction_ = 1, last_alpha_ = 1;
   std::vector<Float4> rhs_, direction_;
 };
@@ -286,7 +287,7 @@ bool Run::iterate(double step) {
   const double before = energy_ + inertia_energy(x_);
   phase("solve");
   solver_.factor(response_.matrix, terms_);
-  solve_report_ = solver_.solve(response_.matrix, terms_, rhs_, direction_, {.tolerance = solver_tolerance, .max_iterations = solver_iterations_max});
+  solve_report_ = solver_.solve(response_.matrix, terms_, rhs_, direction_, {.tolerance = tolerance_, .max_iterations = solver_iterations_max});
   report_.solver_iterations += solve_report_.iterations;
   ++report_.iterations;
   phase("limit");
@@ -313,7 +314,7 @@ bool Run::iterate(double step) {
     const Points3 candidate = alpha == 1 ? reached : Points3(from + alpha * (reached - from));
     evaluate(candidate, true);
     const double after = energy_ + inertia_energy(candidate);
-    if (after <= before + energy_slack * weight_ || trial == 5) {
+    if (after <= before + slack_ * weight_ || trial == 5) {
       x_ = candidate;
       moved = true;
       break;
@@ -331,7 +332,7 @@ void Run::accept() {
   friction_ = update_friction(friction_, start_, contacts_, x_, support_x_, sheet_.area, laws_);
   const double total = energy_ - friction_energy_;
   if (total <= last_total_) {
-    inertia_ = x_ + momentum * (x_ - start_);
+    inertia_ = x_ + momentum_ * (x_ - start_);
   } else {
     inertia_ = x_;
   }
@@ -443,8 +444,12 @@ void Run::relax() {
     if (last_alpha_ < 0.5 || residual > 4 * best) {
       step_ = std::max(0.7 * step_, params_.time_step / 8);
     } else if (stalled >= stall_limit) {
-      // Nothing gained for long: begin again with a short step.
+      // Nothing gained for long: what is left is a jitter that inexact solves feed and momentum keeps up. Begin again with a
+      // short step, less momentum, sharper solves and less tolerance of rising energy.
       step_ = std::max(0.2 * step_, params_.time_step / 4);
+      momentum_ = 0.8 * momentum_;
+      tolerance_ = std::max(0.2 * tolerance_, 1e-5);
+      slack_ = std::max(0.1 * slack_, 1e-7);
       best = residual;
       stalled = 0;
     } else if (left < solved_well || last_move_ < quiet_move) {

@@ -341,8 +341,16 @@ Result<Placed> place(const mesh::GarmentMesh& garment, const mesh::SupportMesh& 
   placed.garment = garment;
   // Large folds on a coarse mesh, where they are cheap; then the fine one needs to lose the creases between coarse
   // triangles only.
-  const CoarseGarment coarse = coarsen(garment, params.coarse);
-  const Points3 folded = relax(coarse.mesh, coarse.restricted(start.x), support, options);
+  // A mesh of about the coarse size is its own coarse mesh: thinning it a little only spoils its triangles.
+  double cell = 0;
+  for (const mesh::Panel& panel : garment.panels) cell = std::max({cell, panel.cell_warp, panel.cell_weft});
+  Points3 folded;
+  if (params.coarse > 1.25 * cell) {
+    const CoarseGarment coarse = coarsen(garment, params.coarse);
+    folded = coarse.prolonged(relax(coarse.mesh, coarse.restricted(start.x), support, options));
+  } else {
+    folded = relax(garment, start.x, support, options);
+  }
   options.flattening.depth = 1;
   options.closing_steps = 0;
   options.swelling_steps = 0;
@@ -350,7 +358,7 @@ Result<Placed> place(const mesh::GarmentMesh& garment, const mesh::SupportMesh& 
   options.progress = [&](double f) {
     if (progress) progress(0.5 + 0.5 * f);
   };
-  placed.garment.x = relax(garment, coarse.prolonged(folded), support, options);
+  placed.garment.x = relax(garment, folded, support, options);
   placed.report = measure(placed.garment, support);
   const Report& report = placed.report;
   const auto finding = [&](const char* code, const std::string& what, const std::string& remedy) {

@@ -18,7 +18,7 @@ struct SimulationParams {
   Mode mode = Mode::equilibrium;
   double gravity = 9.81;
   double residual = 1e-3;
-  int max_iterations = 600;
+  int max_iterations = 1200;
   double duration = 1.0;
   double time_step = 1.0 / 60;
   int newton_iterations = 4;
