@@ -34,6 +34,7 @@ Usage timed(const std::vector<std::string>& words) {
   for (const std::string& word : words) argv.push_back(const_cast<char*>(word.c_str()));
   argv.push_back(nullptr);
   const auto start = Clock::now();
+  std::fflush(stdout);  // or the child writes the pending rows again
   const pid_t child = ::fork();
   if (child == 0) {
     if (!std::freopen("/dev/null", "w", stdout)) ::_exit(127);
