@@ -28,7 +28,7 @@ inline void add_fabric(mesh::GarmentMesh& g, const fabric::Card& card) {
   mesh::Laminate laminate;
   laminate.id = static_cast<int>(g.laminates.size());
   laminate.name = card.name;
-  laminate.plies.push_back({card.name, card.areal_density});
+  laminate.plies.push_back({card.name, "", card.areal_density});
   laminate.equivalent = card;
   g.laminates.push_back(laminate);
 }

@@ -75,13 +75,19 @@ inline mesh::GarmentMesh two_panels(int n = 3) {
   mesh::GarmentMesh g;
   const fabric::Card card = sample_card();
   g.fabrics = {card};
-  g.laminates = {{.id = 0, .name = "shell", .plies = {{card.name, card.areal_density}}, .equivalent = card}};
+  g.laminates = {{.id = 0, .name = "shell", .plies = {{card.name, "", card.areal_density}}, .equivalent = card}};
   add_rectangle(g, "front", n, n, 0.01);
   add_rectangle(g, "back", n, n, 0.01, (n + 0.5) * 0.01);
   g.seams = {{.id = 0, .name = "side", .kind = "plain", .length_a = n * 0.01, .length_b = n * 0.01}};
   const auto a = mesh::run_vertex_ids(g, 1), b = mesh::run_vertex_ids(g, 7);
   for (std::size_t k = 0; k < a.size(); ++k) g.welds.push_back({a[k], b[b.size() - 1 - k], 0});
-  g.fasteners = {{0, 1, mesh::Fastener::Kind::button, 0.001, 0.002}};
+  g.closures = {{0, "top", "button"}};
+  g.fasteners = {{0, 1, mesh::Fastener::Kind::button, 0.001, 0.002, 0, true, 300, 0.01}};
+  g.folds = {{0, "crease", "crease", 1.2, 0.0}};
+  g.hinges = {{g.faces(0, 0), g.faces(0, 1), g.faces(0, 2), g.faces(1, 0) == g.faces(0, 0) || g.faces(1, 0) == g.faces(0, 1) ? g.faces(1, 2) : g.faces(1, 0), 1.2, 1.5, 0}};
+  g.trims = {{0, "side tape", "tape", 0, 300, 1e-6, 0.002, 0.98, false}};
+  g.trim_segments = {{a[0], a[1], 0, 0.0098}, {a[1], a[2], 0, 0.0098}};
+  g.free_layers = {{0, "patch", {1}, {0}, true}};
   return g;
 }
 

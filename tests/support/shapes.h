@@ -84,9 +84,9 @@ inline void add_panel(mesh::GarmentMesh& g, const std::string& name, double widt
   }
   if (g.laminates.empty()) {
     g.fabrics = {plain_card()};
-    g.laminates.push_back({0, "plain", {{"plain", plain_card().areal_density}}, plain_card()});
+    g.laminates.push_back({.id = 0, .name = "plain", .plies = {{"plain", "", plain_card().areal_density}}, .equivalent = plain_card()});
   }
-  g.panels.push_back({id, name, name, false, height / rows, width / columns, width * height});
+  g.panels.push_back({.id = id, .name = name, .piece = name, .cell_warp = height / rows, .cell_weft = width / columns, .cut_area = width * height});
   const auto add_run = [&](const std::string& run_name, double length, int count, const auto& vertex) {
     const int run = static_cast<int>(g.runs.size());
     g.runs.push_back({run, id, run_name, length, false, false});

@@ -14,6 +14,14 @@ namespace {
 mesh::GarmentMesh sample() {
   auto g = shapes::tube(0.2, 0.4, 24, 10, 1);
   g.fasteners.push_back({0, 5, mesh::Fastener::Kind::button, 0.001, 0.002});
+  g.closures.push_back({0, "cuff", "button"});
+  g.fasteners.back().closure = 0;
+  g.folds.push_back({0, "crease", "crease", 1.5, 0.001});
+  g.hinges.push_back({g.faces(0, 0), g.faces(0, 1), g.faces(0, 2), g.faces(5, 0), 0.3, 2.0, 0});
+  g.trims.push_back({0, "waist", "elastic", -1, 20, 1e-6, 0.004, 0.8, true});
+  g.trim_segments.push_back({0, 1, 0, 0.008});
+  g.trim_segments.push_back({1, 2, 0, 0.008});
+  g.free_layers.push_back({0, "pocket", {0}, {}, true});
   g.marks["converged"] = "yes";
   g.marks["residual"] = "0.00071";
   g.vertex_columns["vx"] = {false, std::vector<double>(static_cast<std::size_t>(g.vertex_count()), 0.25), {}};
@@ -58,6 +66,23 @@ TEST(Diff, every_kind_of_mutation_is_found) {
       {"a fastener is missing", [](G& g) { g.fasteners.clear(); }},
       {"a fastener is heavier by a milligram", [](G& g) { g.fasteners[0].mass += 1e-6; }},
       {"a fastener is another kind", [](G& g) { g.fasteners[0].kind = mesh::Fastener::Kind::snap; }},
+      {"a fastener is open", [](G& g) { g.fasteners[0].closed = false; }},
+      {"a fastener gives way", [](G& g) { g.fasteners[0].stiffness = 100; }},
+      {"a fastener catches later", [](G& g) { g.fasteners[0].capture = 0.01; }},
+      {"a fastener belongs to nothing", [](G& g) { g.fasteners[0].closure = -1; }},
+      {"a closure is renamed", [](G& g) { g.closures[0].name = "cuf"; }},
+      {"a hinge is missing", [](G& g) { g.hinges.clear(); }},
+      {"a hinge is turned", [](G& g) { std::swap(g.hinges[0].v0, g.hinges[0].v1); }},
+      {"a hinge is flatter", [](G& g) { g.hinges[0].rest_angle -= 1e-6; }},
+      {"a hinge is softer", [](G& g) { g.hinges[0].factor -= 1e-6; }},
+      {"a hinge belongs to no fold", [](G& g) { g.hinges[0].fold = -1; }},
+      {"a fold is sharper", [](G& g) { g.folds[0].radius = 0; }},
+      {"a trim segment is missing", [](G& g) { g.trim_segments.pop_back(); }},
+      {"a trim segment ends elsewhere", [](G& g) { g.trim_segments[1].b = 3; }},
+      {"a trim segment is longer", [](G& g) { g.trim_segments[1].rest_length += 1e-6; }},
+      {"a trim is stiffer", [](G& g) { g.trims[0].stretch *= 1.001; }},
+      {"a free layer changes sides", [](G& g) { g.free_layers[0].outside = false; }},
+      {"a panel lies farther out", [](G& g) { g.panels[0].order = 1; }},
       {"a run ends one vertex earlier", [](G& g) { g.run_vertices.pop_back(); }},
       {"a run's abscissa moves", [](G& g) { g.run_vertices[4].s += 1e-6; }},
       {"a run is renamed", [](G& g) { g.runs[1].name = "rigth"; }},
@@ -70,7 +95,7 @@ TEST(Diff, every_kind_of_mutation_is_found) {
       {"the cloth is heavier", [](G& g) { g.laminates[0].equivalent.areal_density *= 1.001; }},
       {"the cloth is stiffer", [](G& g) { g.laminates[0].equivalent.warp.bending *= 1.001; }},
       {"the cloth has another name", [](G& g) { g.fabrics[0].name = "silk"; }},
-      {"a ply is added", [](G& g) { g.laminates[0].plies.push_back({"canvas", 0.1}); }},
+      {"a ply is added", [](G& g) { g.laminates[0].plies.push_back({"canvas", "", 0.1}); }},
       {"it did not converge", [](G& g) { g.marks["converged"] = "no"; }},
       {"a mark is missing", [](G& g) { g.marks.erase("residual"); }},
       {"a further column changes", [](G& g) { g.vertex_columns["vx"].reals[11] += 1e-3; }},

@@ -143,7 +143,13 @@ TEST(garment_file, write_read_write_gives_the_same_bytes) {
     const auto back = io::parse_garment(bytes, "g.ply");
     ASSERT_TRUE(back) << to_string(back.issues().front());
     EXPECT_EQ(io::format_garment(*back, encoding), bytes);
-    EXPECT_EQ(back->fasteners.size(), 1u);
+    ASSERT_EQ(back->fasteners.size(), 1u);
+    EXPECT_EQ(back->fasteners[0].stiffness, 300);
+    ASSERT_EQ(back->hinges.size(), 1u);
+    EXPECT_EQ(back->hinges[0].rest_angle, 1.2);
+    ASSERT_EQ(back->trim_segments.size(), 2u);
+    EXPECT_EQ(back->trim_segments[1].rest_length, 0.0098);
+    EXPECT_EQ(back->free_layers[0].on, std::vector<int>{0});
     EXPECT_EQ(back->vertex_columns.at("vx").reals[0], 1.0 / 3);
     EXPECT_EQ(back->face_columns.at("tag").integers[0], 7);
     EXPECT_EQ(back->laminates[0].equivalent.warp.bending, g.laminates[0].equivalent.warp.bending);

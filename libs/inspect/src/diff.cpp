@@ -204,7 +204,7 @@ Meaning meaning(const mesh::GarmentMesh& g) {
     m.mass += p.mass;
     m.panels.emplace(p.name, std::move(p));
   }
-  for (const mesh::Fastener& f : g.fasteners) m.mass += f.mass;
+  m.mass += mesh::trimmings_mass(g);
   return m;
 }
 
@@ -329,6 +329,25 @@ DiffReport diff(const DiffParams& params, const mesh::GarmentMesh& a, const mesh
     c.integers("fastener.kind", n, [&](std::size_t i) { return static_cast<int>(a.fasteners[i].kind); }, [&](std::size_t i) { return static_cast<int>(b.fasteners[i].kind); });
     c.reals("fastener.mass", n, [&](std::size_t i) { return a.fasteners[i].mass; }, [&](std::size_t i) { return b.fasteners[i].mass; });
     c.reals("fastener.length", n, [&](std::size_t i) { return a.fasteners[i].length; }, [&](std::size_t i) { return b.fasteners[i].length; });
+    c.integers("fastener.closure", n, [&](std::size_t i) { return a.fasteners[i].closure; }, [&](std::size_t i) { return b.fasteners[i].closure; });
+    c.integers("fastener.closed", n, [&](std::size_t i) { return static_cast<int>(a.fasteners[i].closed); }, [&](std::size_t i) { return static_cast<int>(b.fasteners[i].closed); });
+    c.reals("fastener.stiffness", n, [&](std::size_t i) { return a.fasteners[i].stiffness; }, [&](std::size_t i) { return b.fasteners[i].stiffness; });
+    c.reals("fastener.capture", n, [&](std::size_t i) { return a.fasteners[i].capture; }, [&](std::size_t i) { return b.fasteners[i].capture; });
+  }
+  if (c.count("hinges", a.hinges.size(), b.hinges.size())) {
+    const std::size_t n = a.hinges.size();
+    for (const auto& [name, member] : {std::pair{"hinge.v0", &mesh::Hinge::v0}, {"hinge.v1", &mesh::Hinge::v1}, {"hinge.o0", &mesh::Hinge::o0}, {"hinge.o1", &mesh::Hinge::o1}, {"hinge.fold", &mesh::Hinge::fold}}) {
+      c.integers(name, n, [&, m = member](std::size_t i) { return a.hinges[i].*m; }, [&, m = member](std::size_t i) { return b.hinges[i].*m; });
+    }
+    c.reals("hinge.rest_angle", n, [&](std::size_t i) { return a.hinges[i].rest_angle; }, [&](std::size_t i) { return b.hinges[i].rest_angle; });
+    c.reals("hinge.factor", n, [&](std::size_t i) { return a.hinges[i].factor; }, [&](std::size_t i) { return b.hinges[i].factor; });
+  }
+  if (c.count("trim segments", a.trim_segments.size(), b.trim_segments.size())) {
+    const std::size_t n = a.trim_segments.size();
+    for (const auto& [name, member] : {std::pair{"trim_segment.a", &mesh::TrimSegment::a}, {"trim_segment.b", &mesh::TrimSegment::b}, {"trim_segment.trim", &mesh::TrimSegment::trim}}) {
+      c.integers(name, n, [&, m = member](std::size_t i) { return a.trim_segments[i].*m; }, [&, m = member](std::size_t i) { return b.trim_segments[i].*m; });
+    }
+    c.reals("trim_segment.rest_length", n, [&](std::size_t i) { return a.trim_segments[i].rest_length; }, [&](std::size_t i) { return b.trim_segments[i].rest_length; });
   }
   if (c.count("run vertices", a.run_vertices.size(), b.run_vertices.size())) {
     const std::size_t n = a.run_vertices.size();
@@ -342,6 +361,10 @@ DiffReport diff(const DiffParams& params, const mesh::GarmentMesh& a, const mesh
   c.table("fabrics", a.fabrics, b.fabrics);
   c.table("laminates", a.laminates, b.laminates);
   c.table("seams", a.seams, b.seams);
+  c.table("folds", a.folds, b.folds);
+  c.table("trims", a.trims, b.trims);
+  c.table("closures", a.closures, b.closures);
+  c.table("free layers", a.free_layers, b.free_layers);
   text_map(c, "marks", a.marks, b.marks);
   if (params.mode == DiffMode::exact) c.table("route", a.route, b.route);
   // Figures of meaning need both sides; where the structure differs they still tell how far.

@@ -358,10 +358,8 @@ Result<Figures> measure(const MeasureParams& params, const mesh::GarmentMesh& g,
     for (Eigen::Index v = 0; v < g.vertex_count(); ++v) ease[static_cast<std::size_t>(g.vertex_panel[v])].push_back(r.support->vertex_ease[static_cast<std::size_t>(v)]);
     for (std::size_t p = 0; p < ease.size(); ++p) r.panels[p].ease = spread(std::move(ease[p]));
   }
-  for (const mesh::Fastener& fastener : g.fasteners) {
-    r.mass += fastener.mass;
-    r.mass_expected += fastener.mass;
-  }
+  r.mass += mesh::trimmings_mass(g);
+  r.mass_expected += mesh::trimmings_mass(g);
   if (r.vertices > 0) {
     const Eigen::VectorXd masses = mesh::vertex_masses(g);
     const double total = masses.sum();

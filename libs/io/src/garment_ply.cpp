@@ -19,6 +19,10 @@ struct Header {
   std::vector<fabric::Card> fabrics;
   std::vector<mesh::Laminate> laminates;
   std::vector<mesh::Seam> seams;
+  std::vector<mesh::Fold> folds;
+  std::vector<mesh::Trim> trims;
+  std::vector<mesh::Closure> closures;
+  std::vector<mesh::FreeLayer> free_layers;
   std::map<std::string, std::string> marks;
   std::vector<mesh::RouteEntry> route;
   static void describe(auto& f) {
@@ -29,6 +33,10 @@ struct Header {
     f(&Header::fabrics, {.key = "fabrics", .doc = "fabric cards"});
     f(&Header::laminates, {.key = "laminates", .doc = "what faces are made of"});
     f(&Header::seams, {.key = "seams", .doc = "seams"});
+    f(&Header::folds, {.key = "folds", .doc = "fold lines"});
+    f(&Header::trims, {.key = "trims", .doc = "tapes, threads, elastics, drawstrings"});
+    f(&Header::closures, {.key = "closures", .doc = "buttons, hooks, snaps, zips"});
+    f(&Header::free_layers, {.key = "free_layers", .doc = "layers with grids of their own"});
     f(&Header::marks, {.key = "marks", .doc = "facts that a stage leaves for later ones"});
     f(&Header::route, {.key = "route", .doc = "stages that the garment went through"});
   }
@@ -62,9 +70,24 @@ constexpr ColumnInfo registry[] = {
     {"weld", "seam", "int", "", "seam id", 0},
     {"fastener", "a", "int", "", "vertex id", 0},
     {"fastener", "b", "int", "", "vertex id", 0},
-    {"fastener", "kind", "int", "", "0 button, 1 hook, 2 snap", 0},
+    {"fastener", "kind", "int", "", "0 button, 1 hook, 2 snap, 3 tooth of a zip", 0},
     {"fastener", "mass", "double", "kg", "mass, shared between the two", 1e-9},
     {"fastener", "length", "double", "m", "distance at which the two are held", 1e-9},
+    {"fastener", "closure", "int", "", "closure id, or -1", 0},
+    {"fastener", "closed", "int", "", "1: holds, or will hold; 0: open", 0},
+    {"fastener", "stiffness", "double", "N/m", "of the spring between the two; 0: a constraint", 1e-6},
+    {"fastener", "capture", "double", "m", "distance at which it takes hold; 0: at once", 1e-9},
+    {"hinge", "v0", "int", "", "first vertex of the edge", 0},
+    {"hinge", "v1", "int", "", "second vertex of the edge", 0},
+    {"hinge", "o0", "int", "", "opposite corner of the triangle that runs v0 to v1", 0},
+    {"hinge", "o1", "int", "", "opposite corner of the other triangle", 0},
+    {"hinge", "rest_angle", "double", "rad", "angle at rest, positive: face sides towards each other", 1e-9},
+    {"hinge", "factor", "double", "1", "bending stiffness over the cloth's", 1e-9},
+    {"hinge", "fold", "int", "", "fold id, or -1", 0},
+    {"trim_segment", "a", "int", "", "vertex id", 0},
+    {"trim_segment", "b", "int", "", "vertex id", 0},
+    {"trim_segment", "trim", "int", "", "trim id", 0},
+    {"trim_segment", "rest_length", "double", "m", "length at rest", 1e-9},
     {"run_vertex", "run", "int", "", "run id", 0},
     {"run_vertex", "vertex", "int", "", "vertex id", 0},
     {"run_vertex", "s", "double", "m", "arc length along the run's true curve", 1e-9},
@@ -115,7 +138,7 @@ Result<mesh::GarmentMesh> parse_garment(std::string_view bytes, const std::strin
   Issues issues = read_record(ply::metadata(document), name, *record_type<Header>(), &header, Units::si);
   // Positions inside the YAML are not lines of the file.
   for (Issue& issue : issues) issue.place.line = issue.place.column = 0;
-  static constexpr std::string_view known[] = {"vertex", "face", "weld", "fastener", "run_vertex"};
+  static constexpr std::string_view known[] = {"vertex", "face", "weld", "fastener", "hinge", "trim_segment", "run_vertex"};
   for (const ply::Element& element : document.elements) {
     if (std::find(std::begin(known), std::end(known), element.name) == std::end(known)) {
       issues.push_back({"bad_ply", {.file = name}, fmt::format("the element '{}' is not known", element.name), "the file was written by a newer version or another program"});
@@ -128,6 +151,10 @@ Result<mesh::GarmentMesh> parse_garment(std::string_view bytes, const std::strin
   garment.fabrics = std::move(header.fabrics);
   garment.laminates = std::move(header.laminates);
   garment.seams = std::move(header.seams);
+  garment.folds = std::move(header.folds);
+  garment.trims = std::move(header.trims);
+  garment.closures = std::move(header.closures);
+  garment.free_layers = std::move(header.free_layers);
   garment.marks = std::move(header.marks);
   garment.route = std::move(header.route);
 
@@ -154,11 +181,20 @@ Result<mesh::GarmentMesh> parse_garment(std::string_view bytes, const std::strin
 
   ply::Columns fastener(document, name, "fastener", issues);
   const auto fastener_a = fastener.integers("a"), fastener_b = fastener.integers("b"), kind = fastener.integers("kind");
-  const auto mass = fastener.reals("mass"), length = fastener.reals("length");
+  const auto mass = fastener.reals("mass"), length = fastener.reals("length"), stiffness = fastener.reals("stiffness"), capture = fastener.reals("capture");
+  const auto closure = fastener.integers("closure"), closed = fastener.integers("closed");
   for (std::size_t i = 0; i < fastener.rows(); ++i) {
-    if (kind[i] < 0 || kind[i] > 2) issues.push_back({"bad_ply", {.file = name, .item = fmt::format("fastener {}", i)}, fmt::format("kind {} is not known", kind[i]), "make the file again"});
-    else garment.fasteners.push_back({fastener_a[i], fastener_b[i], static_cast<mesh::Fastener::Kind>(kind[i]), mass[i], length[i]});
+    if (kind[i] < 0 || kind[i] > 3) issues.push_back({"bad_ply", {.file = name, .item = fmt::format("fastener {}", i)}, fmt::format("kind {} is not known", kind[i]), "make the file again"});
+    else garment.fasteners.push_back({fastener_a[i], fastener_b[i], static_cast<mesh::Fastener::Kind>(kind[i]), mass[i], length[i], closure[i], closed[i] != 0, stiffness[i], capture[i]});
   }
+  ply::Columns hinge(document, name, "hinge", issues);
+  const auto v0 = hinge.integers("v0"), v1 = hinge.integers("v1"), o0 = hinge.integers("o0"), o1 = hinge.integers("o1"), fold = hinge.integers("fold");
+  const auto rest_angle = hinge.reals("rest_angle"), factor = hinge.reals("factor");
+  for (std::size_t i = 0; i < hinge.rows(); ++i) garment.hinges.push_back({v0[i], v1[i], o0[i], o1[i], rest_angle[i], factor[i], fold[i]});
+  ply::Columns trim_segment(document, name, "trim_segment", issues);
+  const auto trim_a = trim_segment.integers("a"), trim_b = trim_segment.integers("b"), trim = trim_segment.integers("trim");
+  const auto rest_length = trim_segment.reals("rest_length");
+  for (std::size_t i = 0; i < trim_segment.rows(); ++i) garment.trim_segments.push_back({trim_a[i], trim_b[i], trim[i], rest_length[i]});
   ply::Columns run_vertex(document, name, "run_vertex", issues);
   const auto run = run_vertex.integers("run"), id = run_vertex.integers("vertex");
   const auto s = run_vertex.reals("s");
@@ -183,6 +219,10 @@ std::string format_garment(const mesh::GarmentMesh& g, Encoding encoding) {
   header.fabrics = g.fabrics;
   header.laminates = g.laminates;
   header.seams = g.seams;
+  header.folds = g.folds;
+  header.trims = g.trims;
+  header.closures = g.closures;
+  header.free_layers = g.free_layers;
   header.marks = g.marks;
   header.route = g.route;
   ply::Document document;
@@ -214,7 +254,23 @@ std::string format_garment(const mesh::GarmentMesh& g, Encoding encoding) {
     document.elements.push_back({"fastener", items.size(),
                                  {ply::integer_column("a", gather(items, [](const auto& f) { return f.a; })), ply::integer_column("b", gather(items, [](const auto& f) { return f.b; })),
                                   ply::integer_column("kind", gather(items, [](const auto& f) { return static_cast<int>(f.kind); })),
-                                  ply::real_column("mass", gather(items, [](const auto& f) { return f.mass; })), ply::real_column("length", gather(items, [](const auto& f) { return f.length; }))}});
+                                  ply::real_column("mass", gather(items, [](const auto& f) { return f.mass; })), ply::real_column("length", gather(items, [](const auto& f) { return f.length; })),
+                                  ply::integer_column("closure", gather(items, [](const auto& f) { return f.closure; })), ply::integer_column("closed", gather(items, [](const auto& f) { return f.closed ? 1 : 0; })),
+                                  ply::real_column("stiffness", gather(items, [](const auto& f) { return f.stiffness; })), ply::real_column("capture", gather(items, [](const auto& f) { return f.capture; }))}});
+  }
+  if (!g.hinges.empty()) {
+    const auto& items = g.hinges;
+    document.elements.push_back({"hinge", items.size(),
+                                 {ply::integer_column("v0", gather(items, [](const auto& h) { return h.v0; })), ply::integer_column("v1", gather(items, [](const auto& h) { return h.v1; })),
+                                  ply::integer_column("o0", gather(items, [](const auto& h) { return h.o0; })), ply::integer_column("o1", gather(items, [](const auto& h) { return h.o1; })),
+                                  ply::real_column("rest_angle", gather(items, [](const auto& h) { return h.rest_angle; })), ply::real_column("factor", gather(items, [](const auto& h) { return h.factor; })),
+                                  ply::integer_column("fold", gather(items, [](const auto& h) { return h.fold; }))}});
+  }
+  if (!g.trim_segments.empty()) {
+    const auto& items = g.trim_segments;
+    document.elements.push_back({"trim_segment", items.size(),
+                                 {ply::integer_column("a", gather(items, [](const auto& t) { return t.a; })), ply::integer_column("b", gather(items, [](const auto& t) { return t.b; })),
+                                  ply::integer_column("trim", gather(items, [](const auto& t) { return t.trim; })), ply::real_column("rest_length", gather(items, [](const auto& t) { return t.rest_length; }))}});
   }
   if (!g.welds.empty()) {
     const auto& items = g.welds;

@@ -1,13 +1,13 @@
 #include "toile/mesh/garment_mesh.h"
 
-#include <Eigen/Geometry>
-
 #include "toile/base/text.h"
 #include "toile/mesh/support_mesh.h"
 #include "toile/mesh/topology.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <numeric>
 #include <set>
 
@@ -68,6 +68,10 @@ Issues validate(const GarmentMesh& g) {
   check_ids_and_names(g.panels, "panel", issues);
   check_ids_and_names(g.seams, "seam", issues);
   check_ids_and_names(g.laminates, "laminate", issues);
+  check_ids_and_names(g.folds, "fold", issues);
+  check_ids_and_names(g.trims, "trim", issues);
+  check_ids_and_names(g.closures, "closure", issues);
+  check_ids_and_names(g.free_layers, "free layer", issues);
   const int panels = static_cast<int>(g.panels.size());
   const auto panel_valid = [&](int p) { return p >= 0 && p < panels; };
   for (Eigen::Index v = 0; v < nv && issues.size() < 20; ++v) {
@@ -96,7 +100,40 @@ Issues validate(const GarmentMesh& g) {
   for (std::size_t i = 0; i < g.fasteners.size() && issues.size() < 20; ++i) {
     const Fastener& f = g.fasteners[i];
     if (!vertex_valid(f.a) || !vertex_valid(f.b) || f.a == f.b) issues.push_back(invalid(fmt::format("fastener {}", i), "its vertices are out of range or the same"));
-    if (!std::isfinite(f.mass) || f.mass < 0 || !std::isfinite(f.length) || f.length < 0) issues.push_back(invalid(fmt::format("fastener {}", i), "mass and length must be finite and not negative"));
+    for (double value : {f.mass, f.length, f.stiffness, f.capture}) {
+      if (!std::isfinite(value) || value < 0) issues.push_back(invalid(fmt::format("fastener {}", i), "mass, length, stiffness and capture must be finite and not negative"));
+    }
+    if (f.closure < -1 || f.closure >= static_cast<int>(g.closures.size())) issues.push_back(invalid(fmt::format("fastener {}", i), fmt::format("closure {} does not exist", f.closure)));
+  }
+  for (std::size_t i = 0; i < g.hinges.size() && issues.size() < 20; ++i) {
+    const Hinge& h = g.hinges[i];
+    const auto item = [&] { return fmt::format("hinge {}", i); };
+    if (!vertex_valid(h.v0) || !vertex_valid(h.v1) || !vertex_valid(h.o0) || !vertex_valid(h.o1)) issues.push_back(invalid(item(), "a vertex id is out of range"));
+    else if (h.v0 == h.v1 || h.o0 == h.o1) issues.push_back(invalid(item(), "its vertices repeat"));
+    if (!(std::abs(h.rest_angle) < std::numbers::pi)) issues.push_back(invalid(item(), "its rest angle is not between -pi and pi"));
+    if (!std::isfinite(h.factor) || h.factor < 0) issues.push_back(invalid(item(), "its factor must be finite and not negative"));
+    if (h.fold < -1 || h.fold >= static_cast<int>(g.folds.size())) issues.push_back(invalid(item(), fmt::format("fold {} does not exist", h.fold)));
+  }
+  int previous_trim = 0;
+  for (std::size_t i = 0; i < g.trim_segments.size() && issues.size() < 20; ++i) {
+    const TrimSegment& t = g.trim_segments[i];
+    const auto item = [&] { return fmt::format("trim segment {}", i); };
+    if (!vertex_valid(t.a) || !vertex_valid(t.b) || t.a == t.b) issues.push_back(invalid(item(), "its vertices are out of range or the same"));
+    if (t.trim < previous_trim || t.trim >= static_cast<int>(g.trims.size())) issues.push_back(invalid(item(), fmt::format("trim {} does not exist, or trims are not in order", t.trim)));
+    else previous_trim = t.trim;
+    if (!std::isfinite(t.rest_length) || t.rest_length <= 0) issues.push_back(invalid(item(), "its rest length must be finite and positive"));
+  }
+  for (const Trim& trim : g.trims) {
+    for (double value : {trim.stretch, trim.bending, trim.linear_density}) {
+      if (!std::isfinite(value) || value < 0) issues.push_back(invalid("trim " + trim.name, "stretch, bending and linear density must be finite and not negative"));
+    }
+    if (!std::isfinite(trim.rest_ratio) || trim.rest_ratio <= 0) issues.push_back(invalid("trim " + trim.name, "its rest ratio must be finite and positive"));
+    if (trim.seam < -1 || trim.seam >= static_cast<int>(g.seams.size())) issues.push_back(invalid("trim " + trim.name, fmt::format("seam {} does not exist", trim.seam)));
+  }
+  for (const FreeLayer& layer : g.free_layers) {
+    for (const auto* list : {&layer.panels, &layer.on}) {
+      if (!std::all_of(list->begin(), list->end(), panel_valid)) issues.push_back(invalid("free layer " + layer.name, "names a panel that does not exist"));
+    }
   }
   std::set<std::pair<int, std::string>> run_names;
   for (std::size_t i = 0; i < g.runs.size(); ++i) {
@@ -218,11 +255,23 @@ Eigen::VectorXd vertex_masses(const GarmentMesh& garment) {
     const double third = areas[f] * garment.laminates[static_cast<std::size_t>(laminate)].equivalent.areal_density / 3;
     for (int k = 0; k < 3; ++k) masses[garment.faces(f, k)] += third;
   }
+  for (const TrimSegment& segment : garment.trim_segments) {
+    const double half = segment.mass(garment.trims[static_cast<std::size_t>(segment.trim)]) / 2;
+    masses[segment.a] += half;
+    masses[segment.b] += half;
+  }
   for (const Fastener& fastener : garment.fasteners) {
     masses[fastener.a] += fastener.mass / 2;
     masses[fastener.b] += fastener.mass / 2;
   }
   return masses;
+}
+
+double trimmings_mass(const GarmentMesh& garment) {
+  double mass = 0;
+  for (const Fastener& fastener : garment.fasteners) mass += fastener.mass;
+  for (const TrimSegment& segment : garment.trim_segments) mass += segment.mass(garment.trims[static_cast<std::size_t>(segment.trim)]);
+  return mass;
 }
 
 }  // namespace toile::mesh

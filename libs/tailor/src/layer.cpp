@@ -151,7 +151,7 @@ Result<Layered> layer(const mesh::GarmentMesh& garment, const std::vector<fabric
       issues.push_back({"bad_fastener", {.item = item}, "its two halves are the same particle", "set them farther apart"});
       continue;
     }
-    fasteners.push_back({a, b, static_cast<mesh::Fastener::Kind>(static_cast<int>(spec.kind)), spec.mass, spec.length});
+    fasteners.push_back({a, b, static_cast<mesh::Fastener::Kind>(static_cast<int>(spec.kind)), spec.mass, spec.length, -1, true, 0, 0});
   }
   if (!issues.empty()) return issues;
 
@@ -175,7 +175,7 @@ Result<Layered> layer(const mesh::GarmentMesh& garment, const std::vector<fabric
       const auto& sheet = cards[static_cast<std::size_t>(card)];
       used.insert(card);
       laminate.name += (laminate.name.empty() ? "" : "+") + sheet.name;
-      laminate.plies.push_back({sheet.name, sheet.areal_density});
+      laminate.plies.push_back({sheet.name, "", sheet.areal_density});
       sheets.push_back(sheet);
     }
     TOILE_TRY(laminate.equivalent, fabric::bonded(sheets, laminate.name));
