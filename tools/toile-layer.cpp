@@ -12,7 +12,7 @@ struct LayerStage {
 
   static stage::Description description() {
     return {.name = "toile-layer",
-            .version = 1,
+            .version = 2,
             .summary = "Gives each panel its fabric, bonds layers to panels or regions, sets buttons.",
             .example = "toile-layer sewn.ply --fabrics samples/fabrics/shirting.yaml -o layered.ply --base shirting",
             .details = "Bonded layers act as one cloth: stiffnesses, masses and thicknesses of the sheets add up (parallel networks). A region is "
