@@ -83,9 +83,9 @@ inline mesh::GarmentMesh two_panels(int n = 3) {
   for (std::size_t k = 0; k < a.size(); ++k) g.welds.push_back({a[k], b[b.size() - 1 - k], 0});
   g.closures = {{0, "top", "button"}};
   g.fasteners = {{0, 1, mesh::Fastener::Kind::button, 0.001, 0.002, 0, true, 300, 0.01}};
-  g.folds = {{0, "crease", "crease", 1.2, 0.0}};
+  g.folds = {{0, "crease", "crease", 1.2, 0.0, {0, 4}, 1.5}};
   g.hinges = {{g.faces(0, 0), g.faces(0, 1), g.faces(0, 2), g.faces(1, 0) == g.faces(0, 0) || g.faces(1, 0) == g.faces(0, 1) ? g.faces(1, 2) : g.faces(1, 0), 1.2, 1.5, 0}};
-  g.trims = {{0, "side tape", "tape", 0, 300, 1e-6, 0.002, 0.98, false}};
+  g.trims = {{0, "side tape", "tape", 0, 300, 1e-6, 0.002, 0.98, false, 0.006, 2}};
   g.trim_segments = {{a[0], a[1], 0, 0.0098}, {a[1], a[2], 0, 0.0098}};
   g.free_layers = {{0, "patch", {1}, {0}, true}};
   return g;

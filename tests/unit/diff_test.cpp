@@ -16,9 +16,9 @@ mesh::GarmentMesh sample() {
   g.fasteners.push_back({0, 5, mesh::Fastener::Kind::button, 0.001, 0.002});
   g.closures.push_back({0, "cuff", "button"});
   g.fasteners.back().closure = 0;
-  g.folds.push_back({0, "crease", "crease", 1.5, 0.001});
+  g.folds.push_back({0, "crease", "crease", 1.5, 0.001, {0}, 2.0});
   g.hinges.push_back({g.faces(0, 0), g.faces(0, 1), g.faces(0, 2), g.faces(5, 0), 0.3, 2.0, 0});
-  g.trims.push_back({0, "waist", "elastic", -1, 20, 1e-6, 0.004, 0.8, true});
+  g.trims.push_back({0, "waist", "elastic", -1, 20, 1e-6, 0.004, 0.8, true, 0.01, 0});
   g.trim_segments.push_back({0, 1, 0, 0.008});
   g.trim_segments.push_back({1, 2, 0, 0.008});
   g.free_layers.push_back({0, "pocket", {0}, {}, true});
@@ -77,6 +77,10 @@ TEST(Diff, every_kind_of_mutation_is_found) {
       {"a hinge is softer", [](G& g) { g.hinges[0].factor -= 1e-6; }},
       {"a hinge belongs to no fold", [](G& g) { g.hinges[0].fold = -1; }},
       {"a fold is sharper", [](G& g) { g.folds[0].radius = 0; }},
+      {"a fold runs along no line", [](G& g) { g.folds[0].runs.clear(); }},
+      {"a fold is softer", [](G& g) { g.folds[0].factor = 1; }},
+      {"a trim is wider", [](G& g) { g.trims[0].width += 1e-6; }},
+      {"a trim has more plies", [](G& g) { g.trims[0].plies = 1; }},
       {"a trim segment is missing", [](G& g) { g.trim_segments.pop_back(); }},
       {"a trim segment ends elsewhere", [](G& g) { g.trim_segments[1].b = 3; }},
       {"a trim segment is longer", [](G& g) { g.trim_segments[1].rest_length += 1e-6; }},

@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 
 #include "garments.h"
 #include "toile/io/file.h"
@@ -149,6 +150,10 @@ TEST(garment_file, write_read_write_gives_the_same_bytes) {
     EXPECT_EQ(back->hinges[0].rest_angle, 1.2);
     ASSERT_EQ(back->trim_segments.size(), 2u);
     EXPECT_EQ(back->trim_segments[1].rest_length, 0.0098);
+    EXPECT_EQ(back->trims[0].width, 0.006);
+    EXPECT_EQ(back->trims[0].plies, 2);
+    EXPECT_EQ(back->folds[0].runs, (std::vector<int>{0, 4}));
+    EXPECT_EQ(back->folds[0].factor, 1.5);
     EXPECT_EQ(back->free_layers[0].on, std::vector<int>{0});
     EXPECT_EQ(back->vertex_columns.at("vx").reals[0], 1.0 / 3);
     EXPECT_EQ(back->face_columns.at("tag").integers[0], 7);
@@ -192,6 +197,22 @@ TEST(garment_file, damage_is_found_wherever_it_is) {
     if (!result) {
       EXPECT_EQ(result.issues().front().place.file, "g.ply");
     }
+  }
+}
+
+TEST(garment_file, folds_and_trims_are_checked) {
+  using G = mesh::GarmentMesh;
+  const std::function<void(G&)> rows[] = {
+      [](G& g) { g.folds[0].runs.push_back(99); },      [](G& g) { g.folds[0].radius = -1; },      [](G& g) { g.folds[0].factor = -1; },
+      [](G& g) { g.hinges[0].rest_angle = 3.2; },       [](G& g) { g.hinges[0].fold = 1; },        [](G& g) { g.trims[0].plies = -1; },
+      [](G& g) { g.trims[0].width = -0.01; },           [](G& g) { g.trims[0].rest_ratio = 0; },   [](G& g) { g.trims[0].seam = 3; },
+      [](G& g) { g.trim_segments[0].rest_length = 0; }, [](G& g) { g.trim_segments[0].trim = 1; },
+  };
+  for (const auto& damage : rows) {
+    G g = test::two_panels();
+    damage(g);
+    const Issues issues = mesh::validate(g);
+    EXPECT_EQ(issues.size(), 1u) << &damage - rows;
   }
 }
 

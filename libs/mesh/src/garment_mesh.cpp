@@ -124,9 +124,10 @@ Issues validate(const GarmentMesh& g) {
     if (!std::isfinite(t.rest_length) || t.rest_length <= 0) issues.push_back(invalid(item(), "its rest length must be finite and positive"));
   }
   for (const Trim& trim : g.trims) {
-    for (double value : {trim.stretch, trim.bending, trim.linear_density}) {
-      if (!std::isfinite(value) || value < 0) issues.push_back(invalid("trim " + trim.name, "stretch, bending and linear density must be finite and not negative"));
+    for (double value : {trim.stretch, trim.bending, trim.linear_density, trim.width}) {
+      if (!std::isfinite(value) || value < 0) issues.push_back(invalid("trim " + trim.name, "stretch, bending, linear density and width must be finite and not negative"));
     }
+    if (trim.plies < 0) issues.push_back(invalid("trim " + trim.name, fmt::format("{} plies are not possible", trim.plies)));
     if (!std::isfinite(trim.rest_ratio) || trim.rest_ratio <= 0) issues.push_back(invalid("trim " + trim.name, "its rest ratio must be finite and positive"));
     if (trim.seam < -1 || trim.seam >= static_cast<int>(g.seams.size())) issues.push_back(invalid("trim " + trim.name, fmt::format("seam {} does not exist", trim.seam)));
   }
@@ -140,6 +141,13 @@ Issues validate(const GarmentMesh& g) {
     const Run& run = g.runs[i];
     if (run.id != static_cast<int>(i) || !panel_valid(run.panel)) issues.push_back(invalid(fmt::format("run {}", i), "its id or panel is wrong"));
     if (!run_names.insert({run.panel, run.name}).second) issues.push_back(invalid(fmt::format("run {}", i), fmt::format("the name '{}' is used twice in its panel", run.name)));
+  }
+  for (const Fold& fold : g.folds) {
+    if (!std::isfinite(fold.angle) || !std::isfinite(fold.radius) || fold.radius < 0) issues.push_back(invalid("fold " + fold.name, "its angle must be finite, its radius finite and not negative"));
+    if (!std::isfinite(fold.factor) || fold.factor < 0) issues.push_back(invalid("fold " + fold.name, "its factor must be finite and not negative"));
+    for (int run : fold.runs) {
+      if (run < 0 || run >= static_cast<int>(g.runs.size())) issues.push_back(invalid("fold " + fold.name, fmt::format("line {} does not exist", run)));
+    }
   }
   int previous_run = 0;
   for (std::size_t i = 0; i < g.run_vertices.size() && issues.size() < 20; ++i) {

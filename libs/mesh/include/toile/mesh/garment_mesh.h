@@ -122,12 +122,16 @@ struct Fold {
   std::string kind = "crease";  ///< crease, roll, hem, knife, box, ... (free text)
   double angle = 0;   ///< rest angle over the whole fold, positive: towards the face side (a valley seen from it) [rad]
   double radius = 0;  ///< of the bend; 0: a sharp crease [m]
+  std::vector<int> runs;  ///< lines that it runs along, by id; empty where none is known
+  double factor = 1;      ///< bending stiffness in the fold over that of the cloth [1]
   static void describe(auto& f) {
     f(&Fold::id, {.key = "id", .doc = "index"});
     f(&Fold::name, {.key = "name", .doc = "name"});
     f(&Fold::kind, {.key = "kind", .doc = "crease, roll, hem, knife, box, ..."});
     f(&Fold::angle, {.key = "angle", .doc = "rest angle over the whole fold, positive: towards the face side", .unit = "rad"});
     f(&Fold::radius, {.key = "radius", .doc = "radius of the bend; 0: a sharp crease", .unit = "m"});
+    f(&Fold::runs, {.key = "runs", .doc = "ids of the lines that it runs along"});
+    f(&Fold::factor, {.key = "factor", .doc = "bending stiffness in the fold over the cloth's", .unit = "1"});
   }
 };
 
@@ -143,6 +147,8 @@ struct Trim {
   double linear_density = 0;   ///< mass per rest length before `rest_ratio` [kg/m]
   double rest_ratio = 1;       ///< rest length over the length of the cloth under it [1]
   bool slack = false;          ///< pulls only, never pushes
+  double width = 0;            ///< across the line; 0: not known [m]
+  int plies = 0;               ///< of an allowance: sheets of its panel's cloth, whose mass and bending toile-layer fills in
   static void describe(auto& f) {
     f(&Trim::id, {.key = "id", .doc = "index"});
     f(&Trim::name, {.key = "name", .doc = "name"});
@@ -153,6 +159,8 @@ struct Trim {
     f(&Trim::linear_density, {.key = "linear_density", .doc = "mass per length of the cloth under it", .unit = "kg/m"});
     f(&Trim::rest_ratio, {.key = "rest_ratio", .doc = "rest length over the length of the cloth under it", .unit = "1"});
     f(&Trim::slack, {.key = "slack", .doc = "pulls only, never pushes"});
+    f(&Trim::width, {.key = "width", .doc = "across the line; 0: not known", .unit = "m"});
+    f(&Trim::plies, {.key = "plies", .doc = "of an allowance: sheets of its panel's cloth"});
   }
 };
 
