@@ -15,7 +15,7 @@ struct MeshStage {
 
   static stage::Description description() {
     return {.name = "toile-mesh",
-            .version = 1,
+            .version = 2,
             .summary = "Cuts the panels of a pattern into particle grids along warp and weft.",
             .example = "toile-mesh samples/patterns/tee.yaml -o panels.ply --cell '10 mm'",
             .details = "Grid nodes stand at the crossings of warp and weft lines inside the panel; the border is sampled on the true curves, on "
@@ -44,10 +44,14 @@ struct MeshStage {
     run.report("panels", garment->panels.size());
     run.report("vertices", static_cast<std::size_t>(garment->vertex_count()));
     run.report("faces", static_cast<std::size_t>(garment->face_count()));
-    double cut_area = 0;
-    for (const auto& panel : garment->panels) cut_area += panel.cut_area;
+    double cut_area = 0, allowance_area = 0;
+    for (const auto& panel : garment->panels) {
+      cut_area += panel.cut_area;
+      allowance_area += panel.allowance_area;
+    }
     const double mesh_area = mesh::rest_areas(*garment).sum();
     run.report("cut_area", cut_area, "m2");
+    run.report("allowance_area", allowance_area, "m2");
     run.report("mesh_area", mesh_area, "m2");
     run.report("area_error", mesh_area / cut_area - 1, "1");
     const tailor::AngleReport angles = tailor::angle_report(*garment);

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <numbers>
+
 #include <cmath>
 
 #include "patterns.h"
@@ -109,6 +111,37 @@ TEST(CutPanels, unfolding_is_exactly_symmetric) {
   EXPECT_EQ(front.notches[1].edge, "side_m");
   EXPECT_NEAR(front.notches[0].s, 0.06, 1e-15);
   EXPECT_NEAR((front.notches[0].at - Point2(-front.notches[1].at.x(), front.notches[1].at.y())).norm(), 0, 1e-12);
+}
+
+TEST(CutPanels, allowances_follow_the_edges_and_their_area_counts_corners_once) {
+  const auto box = [](const std::string& hem, const std::string& more) {
+    return cut("units: mm\ny: up\npieces:\n  box:\n    cut: 2\n    grain: [[0, 0], [0, 1]]\n    allowance: 10\n    points: {a: [0, 0], b: [100, 0], c: [100, 50], d: [0, 50]}\n"
+               "    outline:\n      - {name: hem, path: [a, b]" + hem + "}\n      - {name: right, path: [b, c]}\n      - {name: top, path: [c, d]}\n      - {name: left, path: [d, a]}\n" + more);
+  };
+  // Mitred corners: the cut piece is a larger rectangle.
+  for (const CutPanel& panel : box("", "")) {
+    EXPECT_NEAR(panel.allowance_area, 120e-3 * 70e-3 - 5000e-6, 1e-15);
+    EXPECT_DOUBLE_EQ(find_edge(panel, "top")->allowance, 0.01);
+  }
+  for (const CutPanel& panel : box(", allowance: 4 cm", "")) {
+    EXPECT_NEAR(panel.allowance_area, 120e-3 * 100e-3 - 5000e-6, 1e-15);
+    EXPECT_DOUBLE_EQ(find_edge(panel, "hem")->allowance, 0.04);
+  }
+  // A hole has none unless its edges say so; there the corners overlap.
+  const std::string hole = "    holes:\n      window:\n        - {name: rim, path: [p, q, r, s, p]%}\n";
+  const auto with_hole = [&](const std::string& own) {
+    std::string text = hole;
+    text.replace(text.find('%'), 1, own);
+    auto panels = cut("units: mm\ny: up\npieces:\n  box:\n    cut: 1\n    grain: [[0, 0], [0, 1]]\n    points: {a: [0, 0], b: [100, 0], c: [100, 50], d: [0, 50], p: [10, 5], q: [50, 5], r: [50, 45], s: [10, 45]}\n"
+                      "    outline:\n      - {name: rest, path: [a, b, c, d, a], allowance: 0}\n" + text);
+    return panels[0].allowance_area;
+  };
+  EXPECT_EQ(with_hole(""), 0);
+  EXPECT_NEAR(with_hole(", allowance: 5"), (40 * 40 - 30 * 30) * 1e-6, 1e-15);
+  // A disc of radius 100 with 10 all round.
+  const CutPanel disc = cut("units: mm\ny: up\npieces:\n  disc:\n    cut: 1\n    grain: [[0, 0], [0, 1]]\n    allowance: 10\n    points: {a: [-100, 0], b: [100, 0]}\n"
+                            "    outline:\n      - {name: low, path: [a, {arc: {through: [0, -100]}}, b]}\n      - {name: high, path: [b, {arc: {through: [0, 100]}}, a]}\n")[0];
+  EXPECT_NEAR(disc.allowance_area, std::numbers::pi * (0.11 * 0.11 - 0.01), 1e-6);
 }
 
 TEST(CutPanels, two_copies_are_a_mirrored_pair) {

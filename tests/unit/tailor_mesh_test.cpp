@@ -102,6 +102,19 @@ TEST(mesh_panels, rectangle_of_whole_cells_is_the_plain_grid) {
   expect_runs_cover_border(g);
 }
 
+TEST(mesh_panels, panels_know_their_material_and_allowances) {
+  std::string yaml = test::half_front;
+  yaml.replace(yaml.find("    fold: centre"), 0, "    allowance: 10\n");
+  yaml.replace(yaml.find("path: [a, b]"), 12, "path: [a, b], allowance: 30");
+  const auto g = meshed(cut(yaml));
+  EXPECT_EQ(g.panels[0].material, "jersey");
+  for (const mesh::Run& run : g.runs) EXPECT_DOUBLE_EQ(run.allowance, run.name.starts_with("hem") ? 0.03 : 0.01) << run.name;
+  double strips = 0;
+  for (const mesh::Run& run : g.runs) strips += run.length * run.allowance;
+  EXPECT_NEAR(g.panels[0].allowance_area, strips, 0.1 * strips);
+  EXPECT_GT(g.panels[0].allowance_area, strips);
+}
+
 TEST(mesh_panels, diagonal_rule_is_followed) {
   const auto slopes = [](const mesh::GarmentMesh& g) {
     std::set<std::pair<int, int>> up, down;  // cells by the direction of their diagonal

@@ -1,6 +1,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "geometry.h"
 
@@ -21,7 +22,7 @@ Similarity reflection(const Point2& a, const Point2& d) {
 }
 
 PanelEdge reversed(const PanelEdge& edge) {
-  return {edge.name, edge.to, edge.from, edge.curve.reversed()};
+  return {edge.name, edge.to, edge.from, edge.curve.reversed(), edge.allowance};
 }
 
 void reverse_loop(std::vector<PanelEdge>& edges) {
@@ -37,7 +38,9 @@ double loop_area(const std::vector<PanelEdge>& edges) {
   return area;
 }
 
-std::vector<PanelEdge> panel_edges(const Piece& piece, const std::vector<Edge>& edges, const Similarity& map) {
+/// otherwise  allowance of edges that have none of their own [pattern units]
+std::vector<PanelEdge> panel_edges(const Piece& piece, const std::vector<Edge>& edges, double otherwise, const Similarity& map) {
+  const double scale = std::sqrt(std::abs(map.linear.determinant()));
   std::vector<PanelEdge> result;
   for (const Edge& edge : edges) {
     std::vector<Segment> segments;
@@ -46,7 +49,7 @@ std::vector<PanelEdge> panel_edges(const Piece& piece, const std::vector<Edge>& 
     segments.front().from = map(piece.points.at(edge.from));
     segments.back().to = map(piece.points.at(edge.to));
     for (std::size_t i = 1; i < segments.size(); ++i) segments[i].from = segments[i - 1].to;
-    result.push_back({edge.name, edge.from, edge.to, Curve(std::move(segments))});
+    result.push_back({edge.name, edge.from, edge.to, Curve(std::move(segments)), edge.allowance.value_or(otherwise) * scale});
   }
   for (std::size_t i = 0; i < result.size(); ++i) {
     const Point2 end = result[(i + result.size() - 1) % result.size()].curve.to();
@@ -181,12 +184,40 @@ CutPanel unfolded(CutPanel panel, const std::string& fold_name) {
   return panel;
 }
 
+/// Area of the allowances outside a loop: strips beside its sides and what corners add or count twice.
+double loop_allowance(const std::vector<PanelEdge>& edges) {
+  std::vector<Curve> curves;
+  for (const PanelEdge& edge : edges) curves.push_back(edge.curve);
+  const Polyline loop = flatten(curves, 1e-6);
+  const std::size_t sides = loop.points.size() - 1;
+  constexpr double sharpest = 2 * std::numbers::pi / 3;
+  double area = 0;
+  for (std::size_t i = 0; i < sides; ++i) {
+    const std::size_t j = (i + 1) % sides;
+    const Point2 in = loop.points[i + 1] - loop.points[i], out = loop.points[j + 1] - loop.points[j];
+    const double a = edges[static_cast<std::size_t>(loop.curve[i])].allowance, b = edges[static_cast<std::size_t>(loop.curve[j])].allowance;
+    area += a * in.norm();
+    const double turn = std::atan2(cross(in, out), in.dot(out)), angle = std::min(std::abs(turn), sharpest);
+    if (!(angle > 0)) continue;
+    // From the squared-off end of either strip to where the offset lines meet.
+    const double after = a == b ? a * std::tan(angle / 2) : (b - a * std::cos(angle)) / std::sin(angle);
+    const double before = a == b ? after : (a - b * std::cos(angle)) / std::sin(angle);
+    if (after < 0 || before < 0) continue;
+    area += std::copysign(0.5 * (a * after + b * before), turn);
+  }
+  return area;
+}
+
 /// What follows from the finished geometry: area, positions of notches, where points lie.
 void complete(CutPanel& panel) {
   panel.area = loop_area(panel.outline);
   panel.perimeter = 0;
   for (const PanelEdge& edge : panel.outline) panel.perimeter += edge.curve.length();
-  for (const PanelHole& hole : panel.holes) panel.area += loop_area(hole.edges);
+  panel.allowance_area = loop_allowance(panel.outline);
+  for (const PanelHole& hole : panel.holes) {
+    panel.area += loop_area(hole.edges);
+    panel.allowance_area += loop_allowance(hole.edges);
+  }
   for (PanelNotch& notch : panel.notches) notch.at = find_edge(panel, notch.edge)->curve.point_at(notch.s);
   std::vector<const PanelEdge*> edges;
   for (const PanelEdge& edge : panel.outline) edges.push_back(&edge);
@@ -269,8 +300,8 @@ Result<std::vector<CutPanel>> cut_panels(const Pattern& pattern) {
     CutPanel panel;
     panel.piece = piece.name;
     panel.material = piece.material;
-    panel.outline = panel_edges(piece, piece.outline, map);
-    for (const Hole& hole : piece.holes) panel.holes.push_back({hole.name, panel_edges(piece, hole.edges, map)});
+    panel.outline = panel_edges(piece, piece.outline, piece.allowance.value_or(0), map);
+    for (const Hole& hole : piece.holes) panel.holes.push_back({hole.name, panel_edges(piece, hole.edges, 0, map)});
     for (const InternalLine& line : piece.lines) {
       std::vector<Segment> segments;
       for (const Segment& segment : line.segments) segments.push_back(map(segment));

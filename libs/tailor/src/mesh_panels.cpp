@@ -145,10 +145,12 @@ Result<mesh::GarmentMesh> mesh_panels(const std::vector<pattern::CutPanel>& all_
     row.id = id;
     row.name = panels[p]->name;
     row.piece = panels[p]->piece;
+    row.material = panels[p]->material;
     row.mirrored = panels[p]->mirrored;
     row.cell_warp = settings[p].cell_warp;
     row.cell_weft = settings[p].cell_weft;
     row.cut_area = panels[p]->area;
+    row.allowance_area = panels[p]->allowance_area;
     garment.panels.push_back(row);
     garment.uv.middleRows(v0, mesh.uv.rows()) = mesh.uv;
     garment.x.middleRows(v0, mesh.uv.rows()).leftCols(2) = mesh.uv.rowwise() + offsets[p].transpose();
@@ -156,7 +158,7 @@ Result<mesh::GarmentMesh> mesh_panels(const std::vector<pattern::CutPanel>& all_
     garment.faces.middleRows(f0, mesh.faces.rows()) = mesh.faces.array() + first;
     garment.face_panel.segment(f0, mesh.faces.rows()).setConstant(id);
     for (const GridRun& run : mesh.runs) {
-      mesh::Run row_run{static_cast<int>(garment.runs.size()), id, run.name, run.length, run.closed, run.internal};
+      mesh::Run row_run{static_cast<int>(garment.runs.size()), id, run.name, run.length, run.closed, run.internal, run.allowance};
       for (const auto& [vertex, s] : run.vertices) garment.run_vertices.push_back({row_run.id, first + vertex, s});
       garment.runs.push_back(std::move(row_run));
     }

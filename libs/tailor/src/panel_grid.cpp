@@ -38,6 +38,7 @@ struct Line {
   std::string name;
   bool internal = false;
   std::vector<double> fixed;  ///< arc lengths that must be vertices, ascending; begins with 0, ends with the length
+  double allowance = 0;
 };
 
 struct Sample {
@@ -205,7 +206,7 @@ Result<PanelMesh> mesh_whole(const pattern::CutPanel& panel, const GridSettings&
     loops.emplace_back();
     for (const auto& edge : edges) {
       loops.back().push_back(static_cast<int>(lines.size()));
-      lines.push_back({&edge.curve, edge.name, false, {}});
+      lines.push_back({&edge.curve, edge.name, false, {}, edge.allowance});
     }
   };
   add_loop(panel.outline);
@@ -542,7 +543,7 @@ Result<PanelMesh> mesh_whole(const pattern::CutPanel& panel, const GridSettings&
   std::vector<int> number(local.vertices.size(), -1);
   int next = 0;
   for (std::size_t l = 0; l < lines.size(); ++l) {
-    GridRun run{lines[l].name, lines[l].curve->length(), false, lines[l].internal, {}};
+    GridRun run{lines[l].name, lines[l].curve->length(), false, lines[l].internal, {}, lines[l].allowance};
     std::vector<std::pair<double, int>> order = slid[l];
     for (const auto& [id, s] : fixed_vertices[l]) order.emplace_back(s, id);
     std::sort(order.begin(), order.end());

@@ -22,6 +22,7 @@ struct GridRun {
   double length = 0;
   bool closed = false, internal = false;
   std::vector<std::pair<int, double>> vertices;  ///< vertex and arc length, in order
+  double allowance = 0;  ///< [m]
 };
 
 struct GridPoint {

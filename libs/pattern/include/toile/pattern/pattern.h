@@ -20,7 +20,7 @@ struct Edge {
   std::string name;  ///< unique in its piece (holes and internal lines included)
   std::string from, to;
   std::vector<Segment> segments;    ///< from the first point to the second
-  std::optional<double> allowance;  ///< seam allowance [pattern units]; without it the piece's
+  std::optional<double> allowance;  ///< seam allowance [pattern units]; without it the piece's (of holes: none)
   bool operator==(const Edge&) const = default;
 };
 
@@ -124,6 +124,7 @@ struct PanelEdge {
   std::string name;
   std::string from, to;  ///< names of its end points
   Curve curve;
+  double allowance = 0;  ///< seam allowance outside it
 };
 
 struct PanelHole {
@@ -175,6 +176,11 @@ struct CutPanel {
   std::optional<std::pair<Point2, Point2>> fold;
   double area = 0;       ///< inside the outline without the holes, exact on the curves [m2]
   double perimeter = 0;  ///< of the outline [m]
+  /// Of the seam allowances outside outline and holes [m2]: along every edge its length by its allowance, more on convex
+  /// curves and less on concave ones. Corners are mitred: the kite between the two squared-off ends is added where the
+  /// border turns outwards (by more than 120 degrees: as by 120) and taken off, as counted twice, where it turns
+  /// inwards. Where the allowance changes so much that the offset lines do not meet, the wider one ends square.
+  double allowance_area = 0;
 };
 
 /// Name of the copy-th panel cut from a piece (from 0): `sleeve`, `sleeve_m`, `sleeve_2`, ...
