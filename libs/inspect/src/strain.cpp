@@ -40,7 +40,7 @@ FaceTension face_tension(const mesh::GarmentMesh& g, const FaceStrain& strain) {
   std::vector<std::pair<fabric::TensileCurve, fabric::TensileCurve>> curves;
   for (const auto& laminate : g.laminates) {
     const fabric::Card& card = laminate.equivalent;
-    curves.emplace_back(fabric::tensile_curve(card.tensile_force_max, card.warp.strain_max, card.warp.linearity), fabric::tensile_curve(card.tensile_force_max, card.weft.strain_max, card.weft.linearity));
+    curves.emplace_back(fabric::tensile_curve(card, card.warp), fabric::tensile_curve(card, card.weft));
   }
   FaceTension t;
   t.warp = t.weft = Eigen::VectorXd::Zero(g.face_count());
