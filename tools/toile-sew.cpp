@@ -3,6 +3,8 @@
 #include "toile/tailor/quality.h"
 #include "toile/tailor/sew.h"
 
+#include <numbers>
+
 namespace {
 
 using namespace toile;
@@ -27,6 +29,9 @@ struct SewStage {
   static Result<stage::Output> run(const Params& params, stage::Run& run) {
     TOILE_TRY(const mesh::GarmentMesh garment, run.garment("garment"));
     TOILE_TRY(tailor::Sewn sewn, tailor::sew(garment, params));
+    TOILE_TRY(tailor::Folded folded, tailor::add_folds(sewn.garment, params.folds));
+    TOILE_TRY(tailor::Trimmed trimmed, tailor::add_trims(folded.garment, params.trims));
+    sewn.garment = std::move(trimmed.garment);
     const tailor::SurfaceReport surface = tailor::surface_report(sewn.garment);
     run.report("seams", sewn.seams.size());
     run.report("welds", sewn.garment.welds.size());
@@ -41,6 +46,10 @@ struct SewStage {
     for (const auto& seam : sewn.seams) {
       run.report(seam.name, fmt::format("{:.2f} mm on {:.2f} mm, {} pairs, {} added, farthest slide {:.2f} mm", seam.length_a * 1e3, seam.length_b * 1e3, seam.pairs, seam.added, seam.farthest_slide * 1e3));
     }
+    for (const auto& fold : folded.folds) {
+      run.report("fold " + fold.name, fmt::format("{:.1f} deg at rest over {:.1f} mm of cloth, {:.1f} mm long, {} hinges", fold.angle * 180 / std::numbers::pi, fold.band * 1e3, fold.length * 1e3, fold.hinges));
+    }
+    for (const auto& trim : trimmed.trims) run.report("trim " + trim.name, fmt::format("{}, {:.1f} mm, {} pieces", trim.kind, trim.length * 1e3, trim.segments));
     const tailor::AngleReport angles = tailor::angle_report(sewn.garment);
     run.report("smallest_angle", angles.least, "deg");
     run.report("smallest_angle_1_percent", angles.percent_1, "deg");

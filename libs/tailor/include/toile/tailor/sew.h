@@ -4,6 +4,8 @@
 #include "toile/base/fields.h"
 #include "toile/base/result.h"
 #include "toile/mesh/garment_mesh.h"
+#include "toile/tailor/fold.h"
+#include "toile/tailor/trim.h"
 
 #include <optional>
 #include <string>
@@ -50,12 +52,16 @@ struct SewParams {
   double tolerance = 0.01;
   double tolerance_max = 0.005;
   double bending_factor = 1;
+  std::vector<FoldSpec> folds;
+  std::vector<TrimSpec> trims;
   static void describe(auto& f) {
     f(&SewParams::seams, {.key = "seams", .doc = "list of seams; their order does not matter"});
     f(&SewParams::matching, {.key = "matching", .doc = "aligned: particles slide along their edge to equal relative arc length; published: they stay"});
     f(&SewParams::tolerance, {.key = "tolerance", .doc = "length difference that needs no declared ease, over the length", .unit = "1", .min = 0, .max = 1});
     f(&SewParams::tolerance_max, {.key = "tolerance_max", .doc = "and at most (half a millimetre is always allowed)", .unit = "m", .min = 0, .max = 1});
     f(&SewParams::bending_factor, {.key = "bending_factor", .doc = "bending stiffness along seams over the cloth's, where a seam says nothing", .unit = "1", .min = 0.1, .max = 1000});
+    f(&SewParams::folds, {.key = "folds", .doc = "creases and rolls, along lines that are edges of the mesh"});
+    f(&SewParams::trims, {.key = "trims", .doc = "tapes, elastic bands and drawstrings along edges and lines"});
   }
 };
 
@@ -72,6 +78,7 @@ struct Sewn {
   std::vector<SeamReport> seams;  ///< by name
 };
 
+/// The seams alone; folds and trims come after, by add_folds() and add_trims().
 /// Pairs of a garment's border vertices become the same particle; the side with fewer particles gets more, the
 /// triangles around are set anew. Panels stay flat. The result does not depend on the order of the seams.
 /// garment  flat panels as from mesh_panels(), without laminates
