@@ -93,8 +93,8 @@ TEST(LinearSolver, AgreesWithADenseSolve) {
     b[static_cast<std::size_t>(i)][3] = 0;
   }
   LinearSolver solver;
-  solver.factor(r.matrix, {term});
-  const SolveReport report = solver.solve(r.matrix, {term}, b, x, {.tolerance = 1e-5, .max_iterations = 1000});
+  solver.factor(r.matrix, {term}, g.x, std::vector<char>(static_cast<std::size_t>(n), 0));
+  const SolveReport report = solver.solve(r.matrix, {term}, b, x, {.tolerance = 1e-6, .max_iterations = 1000});
   EXPECT_TRUE(report.converged);
   const Eigen::VectorXd exact = dense.ldlt().solve(rhs);
   double error = 0;

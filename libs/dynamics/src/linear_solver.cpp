@@ -58,7 +58,7 @@ Block product(const Block& a, const Block& b) {
 
 }  // namespace
 
-void LinearSolver::factor(const BlockMatrix& matrix, const std::vector<ContactTerm>& terms) {
+void LinearSolver::factor(const BlockMatrix& matrix, const std::vector<ContactTerm>& terms, const mesh::Points3& x, const std::vector<char>& fixed) {
   const auto n = static_cast<std::size_t>(matrix.rows());
   // Terms around each node.
   node_term_start_.assign(n + 1, 0);
@@ -107,7 +107,12 @@ void LinearSolver::factor(const BlockMatrix& matrix, const std::vector<ContactTe
   }
   // L D L^T without fill, row by row: lower_ holds L, inverse_ the inverted pivots. Dropping fill can make a pivot
   // indefinite; then the domain is factored anew with a heavier diagonal (Manteuffel's shift).
-  parallel_for(domain_start_.size() - 1, 1, [&](std::size_t d) {
+  parallel_for(domain_start_.size(), 1, [&](std::size_t task) {
+    if (task == 0) {
+      coarse_.factor(matrix, terms, x, fixed);
+      return;
+    }
+    const std::size_t d = task - 1;
     for (double shift = 0; !factor_domain(matrix, d, shift); shift = shift == 0 ? 0.01 : 3 * shift) {
       TOILE_CHECK(shift < 100, "a diagonal block is not positive definite: shift {}", shift);
     }
@@ -161,7 +166,13 @@ bool LinearSolver::factor_domain(const BlockMatrix& matrix, std::size_t d, doubl
 }
 
 void LinearSolver::precondition(const std::vector<Float4>& r, std::vector<Float4>& z) {
-  parallel_for(domain_start_.size() - 1, 1, [&](std::size_t d) {
+  // The coarse space is one more domain beside the others.
+  parallel_for(domain_start_.size(), 1, [&](std::size_t task) {
+    if (task == 0) {
+      coarse_.solve(r);
+      return;
+    }
+    const std::size_t d = task - 1;
     for (int row = domain_start_[d]; row < domain_start_[d + 1]; ++row) {
       const auto i = static_cast<std::size_t>(row);
       Float4 sum = r[i];
@@ -177,6 +188,7 @@ void LinearSolver::precondition(const std::vector<Float4>& r, std::vector<Float4
       }
     }
   });
+  parallel_for(z.size(), grain, [&](std::size_t i) { z[i] += coarse_.correction(i); });
 }
 
 void LinearSolver::multiply(const BlockMatrix& matrix, const std::vector<ContactTerm>& terms, const std::vector<Float4>& x, std::vector<Float4>& y) {

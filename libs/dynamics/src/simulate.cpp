@@ -286,7 +286,7 @@ bool Run::iterate(double step) {
   };
   const double before = energy_ + inertia_energy(x_);
   phase("solve");
-  solver_.factor(response_.matrix, terms_);
+  solver_.factor(response_.matrix, terms_, x_, fixed_);
   solve_report_ = solver_.solve(response_.matrix, terms_, rhs_, direction_, {.tolerance = tolerance_, .max_iterations = solver_iterations_max});
   report_.solver_iterations += solve_report_.iterations;
   ++report_.iterations;

@@ -2,6 +2,7 @@
 // any thread count.
 #pragma once
 
+#include "toile/dynamics/coarse_space.h"
 #include "toile/mechanics/block_matrix.h"
 
 #include <array>
@@ -12,14 +13,6 @@ namespace toile::dynamics {
 using mechanics::Block;
 using mechanics::BlockMatrix;
 using mechanics::Float4;
-
-/// A positive semidefinite contribution w w^T (x) block on a few nodes: a contact between nodes that the sheet does not
-/// couple.
-struct ContactTerm {
-  std::array<int, 4> node{-1, -1, -1, -1};  ///< -1: unused
-  std::array<float, 4> weight{};
-  Block block;
-};
 
 struct SolveOptions {
   double tolerance = 1e-2;  ///< on the preconditioned residual, relative to its start [1]
@@ -36,7 +29,9 @@ struct SolveReport {
 class LinearSolver {
  public:
   /// Prepares the preconditioner. Diagonal blocks of the terms are taken in.
-  void factor(const BlockMatrix& matrix, const std::vector<ContactTerm>& terms);
+  /// x      where the matrix was taken, |rows| x 3 [m]
+  /// fixed  nodes that do not move, |rows|
+  void factor(const BlockMatrix& matrix, const std::vector<ContactTerm>& terms, const mesh::Points3& x, const std::vector<char>& fixed);
   /// matrix * x = b; the start is zero. matrix and terms as in factor().
   SolveReport solve(const BlockMatrix& matrix, const std::vector<ContactTerm>& terms, const std::vector<Float4>& b, std::vector<Float4>& x, const SolveOptions& options);
 
@@ -51,6 +46,7 @@ class LinearSolver {
   std::vector<int> row_start_, column_;
   std::vector<Block> lower_;
   std::vector<int> node_term_start_, node_term_;
+  CoarseSpace coarse_;
   std::vector<Float4> term_force_, r_, z_, p_, q_;
 };
 
