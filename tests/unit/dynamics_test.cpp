@@ -68,8 +68,9 @@ TEST(LinearSolver, AgreesWithADenseSolve) {
   const mechanics::Sheet sheet = *mechanics::make_sheet(g, mesh::particles(g), {});
   mechanics::SheetResponse r;
   mechanics::evaluate(sheet, g.x, mesh::Points3(0, 3), mechanics::Curvature::positive, r);
+  // A diagonal of 1 N/m beside membranes of 10^4: single precision then leaves four digits of a solution.
   for (int i = 0; i < r.matrix.rows(); ++i) {
-    for (int c = 0; c < 3; ++c) r.matrix.value[static_cast<std::size_t>(r.matrix.diagonal[static_cast<std::size_t>(i)])].column[c][c] += 0.1f;
+    for (int c = 0; c < 3; ++c) r.matrix.value[static_cast<std::size_t>(r.matrix.diagonal[static_cast<std::size_t>(i)])].column[c][c] += 1.0f;
   }
   ContactTerm term;
   term.node = {0, 40, 41, 53};
@@ -97,11 +98,13 @@ TEST(LinearSolver, AgreesWithADenseSolve) {
   const SolveReport report = solver.solve(r.matrix, {term}, b, x, {.tolerance = 1e-6, .max_iterations = 1000});
   EXPECT_TRUE(report.converged);
   const Eigen::VectorXd exact = dense.ldlt().solve(rhs);
-  double error = 0;
+  Eigen::VectorXd found(3 * n);
   for (int i = 0; i < n; ++i) {
-    for (int c = 0; c < 3; ++c) error = std::max(error, std::abs(static_cast<double>(x[static_cast<std::size_t>(i)][c]) - exact[3 * i + c]));
+    for (int c = 0; c < 3; ++c) found[3 * i + c] = static_cast<double>(x[static_cast<std::size_t>(i)][c]);
   }
-  EXPECT_LT(error, 1e-3 * exact.cwiseAbs().maxCoeff());
+  const Eigen::VectorXd error = found - exact;
+  EXPECT_LT(error.cwiseAbs().maxCoeff(), 3e-4 * exact.cwiseAbs().maxCoeff());
+  EXPECT_LT(error.dot(dense * error), 1e-7 * exact.dot(dense * exact));
 }
 
 TEST(Simulate, HangingStripStretchesUnderItsOwnWeight) {
