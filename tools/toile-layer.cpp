@@ -1,5 +1,5 @@
 // Says what the panels are made of.
-#include "toile/io/record_yaml.h"
+#include "toile/io/fabric_yaml.h"
 #include "toile/stage/stage.h"
 #include "toile/tailor/layer.h"
 
@@ -12,7 +12,7 @@ struct LayerStage {
 
   static stage::Description description() {
     return {.name = "toile-layer",
-            .version = 2,
+            .version = 3,
             .summary = "Gives each panel its fabric, bonds layers to panels or regions, sets buttons.",
             .example = "toile-layer sewn.ply --fabrics samples/fabrics/shirting.yaml -o layered.ply --base shirting",
             .details = "Bonded layers act as one cloth: stiffnesses, masses and thicknesses of the sheets add up (parallel networks). A region is "
@@ -33,7 +33,7 @@ struct LayerStage {
         append(issues, text.issues());
         continue;
       }
-      const auto card = io::read_record<fabric::Card>(*text, run.paths("fabrics")[k]);
+      const auto card = io::read_fabric(*text, run.paths("fabrics")[k]);
       if (card) cards.push_back(*card);
       else append(issues, card.issues());
     }

@@ -291,12 +291,6 @@ Result<Constitutive> constitutive(const Card& card) {
   loss.shear.second = card.shear_hysteresis_5 > 0 ? card.shear_hysteresis_5 / 2 : loss.shear.first;
   loss.resilience_warp = card.warp.resilience;
   loss.resilience_weft = card.weft.resilience;
-  const auto lost = [&](const TensileCurve& curve, double resilience) {
-    const double strain = strain_at(curve, card.tensile_force_max);
-    return (1 - resilience) * curve.at(strain).energy / (2 * strain);
-  };
-  loss.tension_warp = lost(result.warp, card.warp.resilience);
-  loss.tension_weft = lost(result.weft, card.weft.resilience);
 
   result.areal_density = card.areal_density;
   result.thickness = card.thickness;

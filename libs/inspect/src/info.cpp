@@ -6,27 +6,12 @@
 #include <Eigen/Geometry>
 #include <numbers>
 
+#include "text_table.h"
+
 namespace toile::inspect {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180;
-
-/// Columns as wide as their widest cell; the first to the left, the others to the right.
-std::string table(const std::vector<std::vector<std::string>>& rows) {
-  std::vector<std::size_t> width;
-  for (const auto& row : rows) {
-    width.resize(std::max(width.size(), row.size()), 0);
-    for (std::size_t k = 0; k < row.size(); ++k) width[k] = std::max(width[k], row[k].size());
-  }
-  std::string out;
-  for (const auto& row : rows) {
-    std::string line = "  ";
-    for (std::size_t k = 0; k < row.size(); ++k) line += k == 0 ? fmt::format("{:<{}}", row[k], width[k]) : fmt::format("  {:>{}}", row[k], width[k]);
-    line.erase(line.find_last_not_of(' ') + 1);
-    out += line + '\n';
-  }
-  return out;
-}
 
 std::string percent(double v) { return fmt::format("{:.2f}", 100 * v); }
 std::string millimetres(double v) {
@@ -66,19 +51,19 @@ std::string garment_text(const std::string& name, const mesh::GarmentMesh& g, co
     rows.push_back({p.name + (p.mirrored ? " (turned over)" : ""), fmt::format("{}", p.vertices), fmt::format("{}", p.faces), fmt::format("{:.3g} x {:.3g}", 1e3 * g.panels[i].cell_weft, 1e3 * g.panels[i].cell_warp), fmt::format("{:.1f}", 1e4 * p.flat_area), fmt::format("{:.2f}", 1e3 * p.mass),
                     fmt::format("{:.1f} deg", p.min_angle / degree), percent(p.strain_warp.min) + " .. " + percent(p.strain_warp.max), percent(p.strain_weft.min) + " .. " + percent(p.strain_weft.max)});
   }
-  out += table(rows);
+  out += text_table(rows);
 
   if (!r.seams.empty()) {
     out += fmt::format("\nseams (open by {:.2f} mm at most, {:.2f} mm on average)\n", 1e3 * r.max_seam_gap, 1e3 * r.mean_seam_gap);
     rows = {{"name", "kind", "welds", "cut mm", "against mm", "ease mm", "now mm", "gap mm"}};
     for (const SeamFigures& s : r.seams) rows.push_back({s.name, s.kind, fmt::format("{}", s.welds), millimetres(s.cut_a), millimetres(s.cut_b), millimetres(s.cut_b - s.cut_a), millimetres(s.now_a), fmt::format("{:.2f}", 1e3 * s.max_gap)});
-    out += table(rows);
+    out += text_table(rows);
   }
   if (!r.openings.empty()) {
     out += "\nopenings\n";
     rows = {{"along", "cut mm", "now mm", "tape mm", "height mm"}};
     for (const OpeningFigures& o : r.openings) rows.push_back({fmt::format("{}", fmt::join(o.runs, " + ")), millimetres(o.flat), millimetres(o.now), millimetres(o.tape), millimetres(o.centre.y())});
-    out += table(rows);
+    out += text_table(rows);
   }
   if (!g.laminates.empty()) {
     out += "\nlaminates\n";
@@ -94,14 +79,14 @@ std::string garment_text(const std::string& name, const mesh::GarmentMesh& g, co
       const double a = area[static_cast<std::size_t>(l.id)];
       rows.push_back({l.name, fmt::format("{}", fmt::join(plies, " / ")), fmt::format("{:.1f}", 1e3 * l.equivalent.areal_density), fmt::format("{:.1f}", 1e4 * a), fmt::format("{:.2f}", 1e3 * a * l.equivalent.areal_density)});
     }
-    out += table(rows);
+    out += text_table(rows);
   }
   if (!g.fasteners.empty()) out += fmt::format("\nfasteners: {}\n", g.fasteners.size());
 
   out += "\nstrain\n";
   rows = {{"", "least %", "median %", "99 % of faces", "greatest %"}};
   for (const auto& [direction, s] : {std::pair{"warp", &r.warp}, std::pair{"weft", &r.weft}, std::pair{"bias", &r.bias}}) rows.push_back({direction, percent(s->min), percent(s->median), percent(s->p99), percent(s->max)});
-  out += table(rows);
+  out += text_table(rows);
   out += fmt::format("  shear angle: {:.2f} deg at most, {:.2f} deg for 99 % of faces\n", r.shear.max / degree, r.shear.p99 / degree);
   if (r.self_intersections) out += fmt::format("self-intersections: {} pairs of faces\n", *r.self_intersections);
   else out += "self-intersections: not searched (--search yes)\n";
@@ -146,13 +131,13 @@ std::string support_text(const std::string& name, const mesh::SupportMesh& s) {
     out += "\ngirths\n";
     std::vector<std::vector<std::string>> rows;
     for (const auto& [key, girth] : s.girths) rows.push_back({key, millimetres(girth) + " mm"});
-    out += table(rows);
+    out += text_table(rows);
   }
   if (!s.landmarks.empty()) {
     out += "\nlandmarks (mm)\n";
     std::vector<std::vector<std::string>> rows;
     for (const auto& [key, p] : s.landmarks) rows.push_back({key, millimetres(p[0]), millimetres(p[1]), millimetres(p[2])});
-    out += table(rows);
+    out += text_table(rows);
   }
   if (!s.route.empty()) out += "\nroute\n" + route_text(s.route);
   return out;

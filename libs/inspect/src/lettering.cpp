@@ -18,7 +18,7 @@ constexpr char degree_sign = '\x01';  // stands for the two bytes of the sign
 
 const std::map<char, Letter>& alphabet() {
   static const std::map<char, Letter> letters{
-      {'0', {4, "120307183847433212"}}, {'1', {2, "072822 1232"}}, {'2', {4, "07183847460242"}},
+      {'0', {4, "120307183847433212"}}, {'1', {2, "072822"}}, {'2', {4, "07183847460242"}},
       {'3', {4, "0718384746354443321203 1535"}}, {'4', {4, "32380444"}}, {'5', {4, "480805354443321203"}},
       {'6', {4, "4738180703123243443505"}}, {'7', {4, "084812"}}, {'8', {4, "15060718384746351504031232434435"}},
       {'9', {4, "0312324347381807061545"}},
@@ -91,7 +91,8 @@ void draw_text(Image& image, double x, double y, double height, const Srgb& colo
         continue;
       }
       const double qx = x + (s[0] - '0') * unit, qy = y - (s[1] - '2') * unit;
-      if (pen_down) draw_stroke(image, px, py, qx, qy, width, color);
+      // A point is a little thicker than a line, or small letters lose it.
+      if (pen_down) draw_stroke(image, px, py, qx, qy, px == qx && py == qy ? std::max(1.5 * width, 2.0) : width, color);
       px = qx;
       py = qy;
       pen_down = true;

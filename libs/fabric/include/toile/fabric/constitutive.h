@@ -93,15 +93,13 @@ struct ShearFriction {
   double at(double angle) const;
 };
 
-/// Internal friction as half heights of the loops that KES-F measures (loading and unloading lie that far above and below
-/// the elastic curve). Zero: none measured.
+/// Internal friction: in bending and shear half heights of the loops that KES-F measures (loading and unloading lie that far
+/// above and below the elastic curve), in tension the part of the work that comes back. Zero and one: none measured.
 struct Hysteresis {
   double moment_warp = 0;   ///< 2HB / 2 along the warp [N]
   double moment_weft = 0;   ///< along the weft [N]
   ShearFriction shear;
-  double tension_warp = 0;  ///< constant force whose loop to EMT and back has the area (1 - RT) WT [N/m]
-  double tension_weft = 0;
-  double resilience_warp = 1;  ///< RT [1]
+  double resilience_warp = 1;  ///< RT: unloading along RT times the loading curve gives back that part of the work [1]
   double resilience_weft = 1;
 };
 
