@@ -11,7 +11,7 @@ struct ImportStage {
 
   static stage::Description description() {
     return {.name = "toile-import",
-            .version = 1,
+            .version = 2,
             .summary = "Receives a pattern drawn by another program and writes it as pattern YAML.",
             .example =
                 "toile-import samples/patterns/freesewing/teagan.json --spec samples/patterns/freesewing/tee.yaml -o "

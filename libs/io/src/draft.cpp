@@ -32,9 +32,9 @@ class PieceImport {
  public:
   /// What to do where the draft does not say enough: ask for it in the spec, or assume it and note so.
   enum class Gaps { error, assume };
-  PieceImport(const DraftPart& part, const ImportPiece& spec, double tolerance, std::string file, Gaps gaps,
+  PieceImport(DraftPart part, const ImportPiece& spec, double tolerance, std::string file, Gaps gaps,
               bool y_down)
-      : part_(part),
+      : part_(std::move(part)),
         up_(0, y_down ? -1 : 1),
         spec_(spec),
         tolerance_(tolerance * 1e3),
@@ -43,6 +43,7 @@ class PieceImport {
 
   Result<pattern::Piece> run(Issues& notes) {
     piece_.name = spec_.name;
+    make_points();
     choose_cut();
     std::vector<std::string> wanted = spec_.points;
     if (auto loop = closed_path(spec_.path.empty() ? seam_path() : spec_.path)) {
@@ -72,8 +73,9 @@ class PieceImport {
       else
         unknown_point("points", name);
     }
+    import_allowances();
     import_grain();
-    import_lines();
+    import_lines(notes);
     import_notches(notes);
     import_buttons(notes);
     if (!issues_.empty()) return issues_;
@@ -129,6 +131,53 @@ class PieceImport {
     return name;
   }
 
+  /// Adds the points that the spec makes; one may be made of another, in any order.
+  void make_points() {
+    std::map<std::string, ImportPoint> open = spec_.made;
+    for (auto it = open.begin(); it != open.end();) {
+      if (part_.find(it->first)) {
+        report("duplicate_name", it->first, "the draft has a point of this name", "choose another name");
+        it = open.erase(it);
+      } else {
+        ++it;
+      }
+    }
+    for (bool progress = true; progress;) {
+      progress = false;
+      for (auto it = open.begin(); it != open.end();) {
+        const auto& [name, made] = *it;
+        const Point2* from = part_.find(made.from);
+        const Point2* to = made.to.empty() ? nullptr : part_.find(made.to);
+        if (!from || (!made.to.empty() && !to)) {
+          ++it;
+          continue;
+        }
+        Point2 p = *from;
+        if (made.by) {
+          p += Point2((*made.by)[0], (*made.by)[1] * up_.y()) * 1e3;
+        } else if (made.fraction) {
+          p += *made.fraction * (*to - *from);
+        } else if ((*to - *from).norm() > same_place) {
+          p += *made.distance * 1e3 * (*to - *from).normalized();
+        } else {
+          report("bad_point", name, fmt::format("'{}' and '{}' are the same place", made.from, made.to),
+                 "name two different points");
+        }
+        part_.points.emplace_back(name, p);
+        it = open.erase(it);
+        progress = true;
+      }
+    }
+    for (const auto& [name, made] : open) {
+      for (const std::string& point : {made.from, made.to}) {
+        if (!point.empty() && !part_.find(point) && !open.count(point)) unknown_point(name, point);
+        if (open.count(point))
+          report("bad_point", name, fmt::format("it is made of '{}', which is not made yet", point),
+                 "make it of points that do not depend on it");
+      }
+    }
+  }
+
   void choose_cut() {
     const DraftPart::Cut* chosen = nullptr;
     for (const DraftPart::Cut& cut : part_.cuts) {
@@ -140,12 +189,12 @@ class PieceImport {
       piece_.copies = chosen->copies;
       piece_.identical = chosen->identical;
       on_fold_ = chosen->on_fold;
-    } else if (!spec_.material.empty() && !part_.cuts.empty()) {
+    } else if (!spec_.material.empty() && !part_.cuts.empty() && !spec_.cut) {
       std::vector<std::string> materials;
       for (const DraftPart::Cut& cut : part_.cuts) materials.push_back(cut.material);
       report("unknown_material", "material",
              fmt::format("the cut list of '{}' has no material '{}'", part_.name, spec_.material),
-             suggestion(spec_.material, materials));
+             suggestion(spec_.material, materials) + "; or say with `cut` how many are cut from it");
     }
     if (spec_.cut) piece_.copies = *spec_.cut;
     if (spec_.identical) piece_.identical = *spec_.identical;
@@ -458,32 +507,160 @@ class PieceImport {
     piece_.grain = pattern::Grain{grain->first, grain->second};
   }
 
-  void import_lines() {
-    for (const auto& [name, line] : spec_.lines) {
-      if (!line.run.empty()) {
-        std::vector<Segment> segments;
-        std::optional<Point2> last;
-        for (const std::string& point : run_points(line.run)) {
-          const Point2* p = part_.find(point);
-          if (!p) {
-            unknown_point(name, point);
-            continue;
-          }
-          if (last) segments.push_back(pattern::line_segment(*last, *p));
-          last = *p;
+  void import_allowances() {
+    if (spec_.allowance) piece_.allowance = *spec_.allowance * 1e3;
+    for (const auto& [name, allowance] : spec_.allowances) {
+      std::vector<std::string> known;
+      pattern::Edge* found = nullptr;
+      const auto look = [&](std::vector<pattern::Edge>& edges) {
+        for (pattern::Edge& edge : edges) {
+          known.push_back(edge.name);
+          if (edge.name == name) found = &edge;
         }
-        piece_.lines.push_back({name, line.kind, std::move(segments)});
+      };
+      look(piece_.outline);
+      for (pattern::Hole& hole : piece_.holes) look(hole.edges);
+      if (found)
+        found->allowance = allowance * 1e3;
+      else
+        report("unknown_edge", "allowances", fmt::format("the piece has no edge '{}'", name), suggestion(name, known));
+    }
+  }
+
+  /// a>b>(c)>d: lines between points, curves where one or two controls stand in brackets between two points.
+  std::vector<Segment> line_of_run(const std::string& name, const std::string& run) {
+    std::vector<Segment> segments;
+    std::optional<Point2> last;
+    std::vector<Point2> controls;
+    const auto malformed = [&](const std::string& what) {
+      report("bad_run", name, fmt::format("'{}': {}", run, what), "write a>b, or a>(c)>b or a>(c)>(d)>b for a curve");
+      return std::vector<Segment>{};
+    };
+    for (const std::string& word : run_points(run)) {
+      const bool control = word.size() > 2 && word.front() == '(' && word.back() == ')';
+      const std::string point = control ? word.substr(1, word.size() - 2) : word;
+      const Point2* p = part_.find(point);
+      if (!p) {
+        unknown_point(name, point);
+        return {};
+      }
+      if (control) {
+        controls.push_back(*p);
+        if (!last) return malformed("it begins with a control");
+        if (controls.size() > 2) return malformed("there are more than two controls between two points");
         continue;
       }
-      const DraftPath* path = part_.path(line.path);
-      if (!path) {
+      if (last && controls.empty()) segments.push_back(pattern::line_segment(*last, *p));
+      if (last && controls.size() == 1) segments.push_back(pattern::quadratic_segment(*last, controls[0], *p));
+      if (last && controls.size() == 2) segments.push_back(pattern::cubic_segment(*last, controls[0], controls[1], *p));
+      controls.clear();
+      last = *p;
+    }
+    if (!controls.empty()) return malformed("it ends with a control");
+    if (segments.empty()) return malformed("it is no line");
+    return segments;
+  }
+
+  void import_lines(Issues& notes) {
+    for (const auto& [name, line] : spec_.lines) {
+      std::vector<std::vector<Segment>> strokes;
+      if (!line.run.empty()) {
+        strokes.push_back(line_of_run(name, line.run));
+      } else if (const DraftPath* path = part_.path(line.path)) {
+        strokes = path->strokes;
+      } else {
         report("unknown_path", name, fmt::format("part '{}' has no path '{}'", part_.name, line.path),
                suggestion(line.path, part_.path_names()));
         continue;
       }
-      for (std::size_t i = 0; i < path->strokes.size(); ++i)
-        piece_.lines.push_back({i == 0 ? name : fmt::format("{}_{}", name, i + 1), line.kind, path->strokes[i]});
+      int number = 1;
+      for (std::vector<Segment>& stroke : strokes) {
+        if (stroke.empty()) continue;
+        // Ends within rounding of a point of the piece are this point.
+        for (const auto& [point, at] : piece_.points) {
+          if ((at - stroke.front().from).norm() <= same_place) stroke.front().from = at;
+          if ((at - stroke.back().to).norm() <= same_place) stroke.back().to = at;
+        }
+        const Curve whole(stroke);
+        double length = 0;
+        for (const Curve& part : on_cloth(whole)) {
+          piece_.lines.push_back({number == 1 ? name : fmt::format("{}_{}", name, number), line.kind, part.segments()});
+          length += part.length();
+          ++number;
+        }
+        if (length < whole.length() - same_place)
+          notes.push_back(Issue{"line_cut",
+                                {.file = file_, .item = spec_.name + "." + name},
+                                fmt::format("{:.4g} of {:.4g} mm of the line lie off the cloth and are left out",
+                                            whole.length() - length, whole.length()),
+                                ""});
+      }
+      if (number == 1 && !strokes.empty() && !strokes.front().empty())
+        report("line_outside", name, "the line does not lie on the cloth", "leave it out, or choose another");
     }
+  }
+
+  /// The parts of a line that lie on the cloth; new ends lie on the border.
+  std::vector<Curve> on_cloth(const Curve& line) const {
+    std::vector<Curve> parts = cut_by(line, piece_.outline, Side::inside);
+    for (const pattern::Hole& hole : piece_.holes) {
+      std::vector<Curve> kept;
+      for (const Curve& part : parts) {
+        for (Curve& rest : cut_by(part, hole.edges, Side::outside)) kept.push_back(std::move(rest));
+      }
+      parts = std::move(kept);
+    }
+    return parts;
+  }
+
+  enum class Side { inside, outside };
+  static std::vector<Curve> cut_by(const Curve& line, const std::vector<pattern::Edge>& edges, Side keep) {
+    constexpr double step = 0.5, precision = 1e-6;  // [mm]
+    std::vector<Segment> segments;
+    for (const pattern::Edge& edge : edges) segments.insert(segments.end(), edge.segments.begin(), edge.segments.end());
+    const Curve border(segments);
+    const std::vector<Point2> loop = border.polyline(1e-4);
+    // What lies on the border stays.
+    const auto stays = [&](double s) {
+      const Point2 p = line.point_at(s);
+      return (std::abs(winding(loop, p)) > 3) == (keep == Side::inside) || border.nearest(p).distance <= same_place;
+    };
+    const auto steps = static_cast<std::size_t>(std::ceil(line.length() / step));
+    std::vector<double> changes;
+    const bool starts = stays(0);
+    bool state = starts;
+    for (std::size_t i = 1; i <= steps; ++i) {
+      double before = line.length() * static_cast<double>(i - 1) / static_cast<double>(steps);
+      double after = line.length() * static_cast<double>(i) / static_cast<double>(steps);
+      if (stays(after) == state) continue;
+      while (after - before > precision) {
+        const double middle = (before + after) / 2;
+        (stays(middle) == state ? before : after) = middle;
+      }
+      changes.push_back((before + after) / 2);
+      state = !state;
+    }
+    if (starts) changes.insert(changes.begin(), 0);
+    if (state) changes.push_back(line.length());
+    std::vector<Curve> kept;
+    for (std::size_t i = 0; i + 1 < changes.size(); i += 2) {
+      if (changes[i + 1] - changes[i] <= step) continue;
+      std::vector<Segment> part = line.part(changes[i], changes[i + 1]).segments();
+      if (changes[i] > 0) part.front().from = border.nearest(part.front().from).point;
+      if (changes[i + 1] < line.length()) part.back().to = border.nearest(part.back().to).point;
+      kept.emplace_back(std::move(part));
+    }
+    return kept;
+  }
+
+  /// Angle by which a closed polyline goes round a point [rad].
+  static double winding(const std::vector<Point2>& loop, const Point2& p) {
+    double sum = 0;
+    for (std::size_t i = 0; i < loop.size(); ++i) {
+      const Point2 a = loop[i] - p, b = loop[(i + 1) % loop.size()] - p;
+      sum += std::atan2(a.x() * b.y() - a.y() * b.x(), a.dot(b));
+    }
+    return sum;
   }
 
   std::string drafted_name(const Point2& p, const std::string& otherwise) const {
@@ -574,7 +751,7 @@ class PieceImport {
     return std::abs(winding) > 1;
   }
 
-  const DraftPart& part_;
+  DraftPart part_;
   Point2 up_;  // the page
   const ImportPiece& spec_;
   double tolerance_;  // [mm]

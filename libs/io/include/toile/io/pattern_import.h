@@ -1,6 +1,7 @@
 // Patterns from other programs (docs/pattern.md, "Import").
 #pragma once
 
+#include <array>
 #include <map>
 #include <optional>
 #include <string>
@@ -31,6 +32,28 @@ struct ImportSplit {
   }
 };
 
+/// A point that the draft lacks, made of its points.
+struct ImportPoint {
+  std::string from, to;
+  std::optional<double> distance, fraction;
+  std::optional<std::array<double, 2>> by;
+  static void describe(auto& f) {
+    f(&ImportPoint::from, {.key = "from", .doc = "point of the draft, or one made here", .required = true});
+    f(&ImportPoint::to, {.key = "to", .doc = "towards this point"});
+    f(&ImportPoint::distance, {.key = "distance", .doc = "so far from the first point", .unit = "m", .min = -100, .max = 100});
+    f(&ImportPoint::fraction,
+      {.key = "fraction", .doc = "or this part of the way", .unit = "1", .min = -100, .max = 100});
+    f(&ImportPoint::by, {.key = "by", .doc = "or moved so far to the right and up the page", .unit = "m"});
+    f.check([](const ImportPoint& point, Issues& issues) {
+      const bool towards = !point.to.empty() && point.distance.has_value() != point.fraction.has_value() && !point.by;
+      const bool moved = point.to.empty() && !point.distance && !point.fraction && point.by;
+      if (!towards && !moved)
+        issues.push_back(Issue{"bad_point", {.item = "from"}, "it is not clear where the point is",
+                               "give `to` with a distance or a fraction, or `by` alone"});
+    });
+  }
+};
+
 struct ImportHole {
   std::string path;
   std::map<std::string, std::string> edges;
@@ -45,7 +68,8 @@ struct ImportLine {
   pattern::LineKind kind = pattern::LineKind::other;
   static void describe(auto& f) {
     f(&ImportLine::path, {.key = "path", .doc = "path of the draft"});
-    f(&ImportLine::run, {.key = "run", .doc = "or straight lines through points: a>b>c"});
+    f(&ImportLine::run, {.key = "run", .doc = "or lines through points: a>b>c; one or two points in brackets between two others are the "
+                                    "controls of a curve: a>(c)>b"});
     f(&ImportLine::kind, {.key = "kind", .doc = "what the line is"});
     f.check([](const ImportLine& line, Issues& issues) {
       if (line.path.empty() == line.run.empty())
@@ -76,6 +100,9 @@ struct ImportPiece {
   std::optional<int> cut;
   std::optional<bool> identical;
   std::string fold, grain;
+  std::optional<double> allowance;
+  std::map<std::string, double> allowances;
+  std::map<std::string, ImportPoint> made;
   std::map<std::string, std::string> edges;
   std::vector<std::string> shortcuts;
   std::vector<ImportSplit> splits;
@@ -90,12 +117,17 @@ struct ImportPiece {
     f(&ImportPiece::path,
       {.key = "path", .doc = "path that is the seam line; without it `seam`, else the only one drawn"});
     f(&ImportPiece::material,
-      {.key = "material", .doc = "which material of the cut list it is cut from; without it the first"});
+      {.key = "material", .doc = "which material of the cut list it is cut from, or another one together with `cut`; without it the first"});
     f(&ImportPiece::cut,
       {.key = "cut", .doc = "how many are cut; without it as the cut list says", .min = 1, .max = 1000});
     f(&ImportPiece::identical, {.key = "identical", .doc = "all copies alike instead of mirrored pairs"});
     f(&ImportPiece::fold, {.key = "fold", .doc = "edge on the fold, or none; without it as the draft says"});
     f(&ImportPiece::grain, {.key = "grain", .doc = "x, y (up), fold, or two points a>b; without it as the draft says"});
+    f(&ImportPiece::allowance,
+      {.key = "allowance", .doc = "seam allowance all round", .unit = "m", .min = 0, .max = 1});
+    f(&ImportPiece::allowances,
+      {.key = "allowances", .doc = "of single edges, by name", .unit = "m", .min = 0, .max = 1});
+    f(&ImportPiece::made, {.key = "made", .doc = "points that the draft lacks, by name"});
     f(&ImportPiece::edges,
       {.key = "edges", .doc = "edges of the outline: name -> run of points a>b>c; others are named by their ends"});
     f(&ImportPiece::shortcuts,
