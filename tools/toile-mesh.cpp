@@ -2,6 +2,7 @@
 #include "toile/io/pattern_yaml.h"
 #include "toile/stage/stage.h"
 #include "toile/tailor/mesh_panels.h"
+#include "toile/tailor/pleat.h"
 #include "toile/tailor/quality.h"
 
 #include <cmath>
@@ -36,10 +37,16 @@ struct MeshStage {
       }
       return issues;
     };
-    const auto panels = pattern::cut_panels(pattern);
+    const auto pleated = pattern::add_pleats(pattern, params.pleats);
+    if (!pleated) return named(pleated.issues());
+    const auto panels = pattern::cut_panels(pleated->pattern);
     if (!panels) return named(panels.issues());
-    auto garment = tailor::mesh_panels(*panels, params);
+    tailor::MeshParams effective = params;
+    for (const std::string& line : tailor::pleat_lines(*pleated)) effective.lines.push_back(line);
+    auto garment = tailor::mesh_panels(*panels, effective);
     if (!garment) return named(garment.issues());
+    TOILE_TRY(tailor::Folded folded, tailor::add_folds(*garment, tailor::pleat_folds(*garment, *pleated, params.pleats)));
+    *garment = std::move(folded.garment);
 
     run.report("panels", garment->panels.size());
     run.report("vertices", static_cast<std::size_t>(garment->vertex_count()));
@@ -62,6 +69,7 @@ struct MeshStage {
     std::string histogram;
     for (std::size_t k = 0; k < angles.histogram.size(); ++k) histogram += fmt::format("{}{}", k ? " " : "", angles.histogram[k]);
     run.report("smallest_angles_by_5_deg", histogram);
+    if (!folded.folds.empty()) run.report("pleat_folds", folded.folds.size());
     if (angles.below_20 > 0) {
       run.warn({"sharp_triangles", {.file = path, .item = tailor::place_text(*garment, garment->faces(angles.least_face, 0))},
                 fmt::format("{} triangles have an angle below 20 degrees, the smallest {:.1f}", angles.below_20, angles.least),

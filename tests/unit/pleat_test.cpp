@@ -245,6 +245,15 @@ TEST(pleat, lines_end_on_the_border_or_where_pressing_ends) {
   }
 }
 
+TEST(pleat, both_folds_of_an_inverted_pleat_are_stitched_to_one_line) {
+  auto s = spec("strip", "top", PleatDirection::inverted, 0.2, 0, 0.04, 1, true);
+  s.length = 0.1;
+  const auto panel = cut(parsed(strip), {s}).panels[0];
+  EXPECT_EQ(panel.lines.size(), 5u);
+  const Flat flat(panel);
+  for (const char* fold : {"p_1a_outer", "p_1b_outer"}) EXPECT_NEAR(flat({line_at(panel, fold), 0}).x(), flat({line_at(panel, "p_1a_meet"), 0}).x(), 1e-12);
+}
+
 TEST(pleat, the_way_a_piece_is_drawn_does_not_matter) {
   // Clockwise, with y down and in centimetres.
   const std::string other = R"(units: cm

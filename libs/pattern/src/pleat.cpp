@@ -409,7 +409,9 @@ class Pleater {
       // The visible fold is a ridge of the face side, the hidden one a valley.
       const double outer = knife.ahead ? 0 : 2 * spec_.depth, meet = 2 * spec_.depth - outer;
       std::vector<Row> rows{{"outer", outer, -spec_.angle, spec_.pressed}, {"inner", spec_.depth, spec_.angle, spec_.pressed}};
-      if (spec_.length > 0) rows.push_back({"meet", meet, 0, spec_.length});
+      // The two folds of an inverted pleat lie on one and the same line.
+      const bool shared = spec_.direction == PleatDirection::inverted && !knife.ahead;
+      if (spec_.length > 0 && !shared) rows.push_back({"meet", meet, 0, spec_.length});
       for (const Row& row : rows) {
         const std::string name = fmt::format("{}_{}_{}", spec_.name, knife.tag, row.role);
         if (!taken.insert(name).second || piece_.points.count(name)) {

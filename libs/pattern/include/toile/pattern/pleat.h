@@ -80,7 +80,8 @@ struct Pleated {
 };
 
 /// Adds the fold lines of pleats to pieces, with points of the same names on the edge, and lets in the cloth that they take up
-/// where `spread` says so. Specs for the same piece are carried out in their order.
+/// where `spread` says so. Pleats that are stitched down have a line NAME_2_meet, on which the visible fold comes to lie (an
+/// inverted pleat one for both, NAME_2a_meet). Specs for the same piece are carried out in their order.
 /// error  issues of check(), "unknown_piece", "unknown_edge", "unknown_point", "point_off_edge", "duplicate_name",
 ///        "narrow_pleats", "pleat_off_edge", "pleat_across", "pleat_on_fold", "pleats_cross"
 Result<Pleated> add_pleats(const Pattern& pattern, const std::vector<PleatSpec>& pleats);

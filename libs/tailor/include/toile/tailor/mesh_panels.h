@@ -5,6 +5,7 @@
 #include "toile/base/result.h"
 #include "toile/mesh/garment_mesh.h"
 #include "toile/pattern/pattern.h"
+#include "toile/pattern/pleat.h"
 
 #include <map>
 #include <optional>
@@ -38,6 +39,7 @@ struct MeshParams {
   std::map<std::string, PanelGrid> panels;
   std::vector<std::string> lines;
   std::vector<std::string> leave_out;
+  std::vector<pattern::PleatSpec> pleats;
   static void describe(auto& f) {
     f(&MeshParams::cell, {.key = "cell", .doc = "grid size along warp and weft", .unit = "m", .min = 1e-4, .max = 0.5});
     f(&MeshParams::cell_warp, {.key = "cell_warp", .doc = "grid size along the warp, if it differs", .unit = "m", .min = 1e-4, .max = 0.5});
@@ -46,6 +48,7 @@ struct MeshParams {
     f(&MeshParams::panels, {.key = "panels", .doc = "settings of single panels, by the name of panel or piece"});
     f(&MeshParams::lines, {.key = "lines", .doc = "internal lines (panel.line) that become edges of the mesh"});
     f(&MeshParams::leave_out, {.key = "leave_out", .doc = "panels or pieces that are not cut"});
+    f(&MeshParams::pleats, {.key = "pleats", .doc = "pleats that are laid into pieces before they are cut; their folds are hinges of the garment"});
   }
 };
 
