@@ -1,0 +1,117 @@
+// The jacket and the waistcoat with the specs of their pipelines, on a coarse grid: lengths of all seams as measured on the
+// drafts, topology of the sewn shell, the same file whatever the order of the seams.
+#include <gtest/gtest.h>
+
+#include <map>
+#include <string>
+
+#include "toile/base/rng.h"
+#include "toile/io/file.h"
+#include "toile/io/pattern_yaml.h"
+#include "toile/io/ply.h"
+#include "toile/io/record_yaml.h"
+#include "toile/tailor/mesh_panels.h"
+#include "toile/tailor/quality.h"
+#include "toile/tailor/sew.h"
+
+using namespace toile;
+
+namespace {
+
+template <class T>
+T checked(Result<T> result) {
+  if (!result) throw std::runtime_error(to_string(result.issues().front()));
+  return std::move(*result);
+}
+
+std::string source(const std::string& name) { return checked(io::read_file(std::string(TOILE_SOURCE_DIR) + "/" + name)); }
+
+mesh::GarmentMesh panels_of(const std::string& garment, double cell) {
+  const auto pattern = checked(io::parse_pattern(source("samples/patterns/" + garment + ".yaml"), garment));
+  auto params = checked(io::read_record<tailor::MeshParams>(source("pipelines/" + garment + "/mesh.yaml"), "mesh.yaml"));
+  params.cell = cell;
+  return checked(tailor::mesh_panels(checked(pattern::cut_panels(pattern)), params));
+}
+
+tailor::SewParams seams_of(const std::string& garment) {
+  return checked(io::read_record<tailor::SewParams>(source("pipelines/" + garment + "/seams.yaml"), "seams.yaml"));
+}
+
+/// Lengths of the two sides [mm].
+using Lengths = std::map<std::string, std::pair<double, double>>;
+
+void expect_lengths(const mesh::GarmentMesh& sewn, const Lengths& expected) {
+  EXPECT_EQ(sewn.seams.size(), expected.size());
+  for (const mesh::Seam& seam : sewn.seams) {
+    const auto it = expected.find(seam.name);
+    ASSERT_NE(it, expected.end()) << seam.name;
+    EXPECT_NEAR(seam.length_a * 1e3, it->second.first, 0.01) << seam.name;
+    EXPECT_NEAR(seam.length_b * 1e3, it->second.second, 0.01) << seam.name;
+  }
+}
+
+/// One piece, and openings of these lengths [mm], from the longest to the shortest.
+void expect_surface(const mesh::GarmentMesh& sewn, const std::vector<double>& openings) {
+  const tailor::SurfaceReport surface = tailor::surface_report(sewn);
+  EXPECT_EQ(surface.components, 1);
+  EXPECT_EQ(surface.euler, 2 - static_cast<int>(openings.size()));
+  EXPECT_EQ(surface.branching_edges, 0);
+  ASSERT_EQ(surface.opening_lengths.size(), openings.size());
+  for (std::size_t k = 0; k < openings.size(); ++k) EXPECT_NEAR(surface.opening_lengths[k] * 1e3, openings[k], 0.002 * openings[k]);
+}
+
+void expect_same_bytes_in_any_order(const mesh::GarmentMesh& flat, tailor::SewParams params) {
+  std::string reference;
+  Rng rng(11);
+  for (int round = 0; round < 4; ++round) {
+    const auto sewn = checked(tailor::sew(flat, params));
+    const std::string bytes = io::format_garment(sewn.garment, io::Encoding::binary);
+    if (reference.empty()) reference = bytes;
+    EXPECT_EQ(bytes, reference);
+    for (std::size_t k = params.seams.size(); k > 1; --k) std::swap(params.seams[k - 1], params.seams[rng.below(k)]);
+  }
+}
+
+}  // namespace
+
+TEST(jacket, shell_is_one_piece_with_three_openings_and_the_drafted_lengths) {
+  const auto flat = panels_of("jacket", 0.02);
+  EXPECT_EQ(flat.panels.size(), 11u);
+  const auto sewn = checked(tailor::sew(flat, seams_of("jacket")));
+  Lengths lengths{{"centre_back", {683.27, 683.27}}};
+  const auto both = [&](const std::string& name, double left_a, double left_b, bool swapped) {
+    lengths[name + "_left"] = {left_a, left_b};
+    lengths[name + "_right"] = swapped ? std::pair{left_b, left_a} : std::pair{left_a, left_b};
+  };
+  both("dart", 209.48, 209.48, false);
+  both("front_side", 439.52, 435.94, true);
+  both("side_back", 445.36, 448.96, true);
+  both("shoulder", 137.91, 137.91, false);
+  both("inseam", 402.00, 401.61, true);
+  both("outseam", 422.73, 423.14, true);
+  both("vent", 101.77, 101.77, false);
+  both("armhole", 518.48, 525.23, false);
+  both("gorge", 66.52, 66.52, false);
+  both("neck", 154.91, 155.02, false);
+  EXPECT_EQ(lengths.size(), 21u);
+  expect_lengths(sewn.garment, lengths);
+  for (const mesh::Seam& seam : sewn.garment.seams) {
+    const bool cap = seam.name.rfind("armhole", 0) == 0;
+    EXPECT_NEAR(seam.length_b - seam.length_a, cap ? 0.00675 : 0, cap ? 1e-5 : 0.009 * seam.length_a) << seam.name;
+  }
+  // Hem, fronts, lapels and collar are one border; the sleeves' hems are the others.
+  expect_surface(sewn.garment, {2689, 231, 231});
+}
+
+TEST(jacket, seams_in_any_order_give_the_same_bytes) {
+  expect_same_bytes_in_any_order(panels_of("jacket", 0.025), seams_of("jacket"));
+}
+
+TEST(jacket, lapels_and_collar_are_folded_towards_their_face) {
+  const auto params = seams_of("jacket");
+  const auto sewn = checked(tailor::sew(panels_of("jacket", 0.01), params));
+  const auto folded = checked(tailor::add_folds(sewn.garment, params.folds));
+  ASSERT_EQ(folded.folds.size(), 3u);
+  for (const auto& fold : folded.folds) EXPECT_GT(fold.angle, 2.5) << fold.name;
+  EXPECT_TRUE(mesh::validate(folded.garment).empty());
+}
