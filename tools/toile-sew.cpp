@@ -3,6 +3,7 @@
 #include "toile/tailor/quality.h"
 #include "toile/tailor/sew.h"
 
+#include <cmath>
 #include <numbers>
 
 namespace {
@@ -14,13 +15,15 @@ struct SewStage {
 
   static stage::Description description() {
     return {.name = "toile-sew",
-            .version = 1,
+            .version = 2,
             .summary = "Sews panels along named edges: border particles of the two sides become the same particle.",
             .example = "toile-sew panels.ply -o sewn.ply --spec pipelines/tee/seams.yaml",
-            .details = "A side of a seam is a chain of edges, panel.edge, in sewing order; '-' before an edge runs it backwards. Edges run "
-                       "counter-clockwise round their panel, so one side of a seam between two panels is always run backwards. Sides are matched "
-                       "by relative arc length; the side with fewer particles gets more. Lengths that differ by more than the tolerance need a "
-                       "declared `ease`. Exit code 4 if lengths differ, a seam is twisted, folds a panel onto itself or closes a triangle to nothing. "
+            .details = "A side of a seam is a chain of edges in sewing order: panel.edge, or a part of it, panel.edge(from..to), between named "
+                       "points, lengths (120 mm; negative: before the end) or percentages (25 %), either of which may be left out; '-' before it "
+                       "runs it backwards. Edges run counter-clockwise round their panel, so one side of a seam between two panels is always run "
+                       "backwards. Sides are matched by relative arc length between match points; the side with fewer particles gets more, and so "
+                       "does every edge sewn to it elsewhere. Lengths that differ by more than the tolerance need a declared `ease` or `gather`. "
+                       "Exit code 4 if lengths differ, a seam is twisted, a chain out of order, or cloth would fold onto itself or close to nothing. "
                        "docs/tailoring.md says how it is done.",
             .inputs = {{.name = "garment", .doc = "flat panels from toile-mesh", .kind = stage::FileKind::garment}},
             .output = stage::FileKind::garment};
@@ -44,7 +47,9 @@ struct SewStage {
     for (double length : surface.opening_lengths) lengths += fmt::format("{}{:.1f}", lengths.empty() ? "" : " ", length * 1e3);
     run.report("opening_lengths_mm", lengths);
     for (const auto& seam : sewn.seams) {
-      run.report(seam.name, fmt::format("{:.2f} mm on {:.2f} mm, {} pairs, {} added, farthest slide {:.2f} mm", seam.length_a * 1e3, seam.length_b * 1e3, seam.pairs, seam.added, seam.farthest_slide * 1e3));
+      const double difference = seam.length_b - seam.length_a;
+      run.report(seam.name, fmt::format("{:.2f} mm on {:.2f} mm, side {} longer by {:.2f} mm of {:.2f} mm allowed, locally up to {:.1f} %; {} pairs, {} added, farthest slide {:.2f} mm", seam.length_a * 1e3, seam.length_b * 1e3, difference > 0 ? "b" : "a",
+                                        std::abs(difference) * 1e3, seam.allowed * 1e3, 100 * (seam.steepest - 1), seam.pairs, seam.added, seam.farthest_slide * 1e3));
     }
     for (const auto& fold : folded.folds) {
       run.report("fold " + fold.name, fmt::format("{:.1f} deg at rest over {:.1f} mm of cloth, {:.1f} mm long, {} hinges", fold.angle * 180 / std::numbers::pi, fold.band * 1e3, fold.length * 1e3, fold.hinges));

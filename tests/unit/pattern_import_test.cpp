@@ -366,7 +366,7 @@ TEST(ImportGarmentCode, panels_with_their_face_up) {
   EXPECT_EQ(imported->notes.size(), 2u);
   EXPECT_EQ(imported->seams,
             "seams:\n  - {name: s1, a: [front.e1], b: [\"-back.e2\"], ease: 20 mm}\n"
-            "  - {name: s2, a: [front.e3], b: [\"back.e0\"]}\n");
+            "  - {name: s2, a: [front.e3], b: [\"back.e0\"], same_direction: true}\n");
 }
 
 TEST(ImportGarmentCode, a_spec_names_edges_and_loses_no_stitch_in_silence) {

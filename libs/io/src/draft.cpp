@@ -831,6 +831,7 @@ std::string seam_spec(const Draft& draft, const std::vector<ImportPiece>& specs,
     text += fmt::format("  - {{name: s{}, a: [{}], b: [\"{}{}\"]", number, names[0], stitch.same_direction ? "" : "-",
                         names[1]);
     if (stitch.part[0] == stitch.part[1]) text += ", kind: dart";
+    if (stitch.same_direction) text += ", same_direction: true";
     // Rounded up to a tenth of a millimetre; whoever drew the stitch meant the difference.
     const double ease = std::ceil(std::abs(lengths[0] - lengths[1]) * 10 - 1e-6) / 10;
     if (ease > 0) text += fmt::format(", ease: {} mm", format_number(ease));

@@ -75,31 +75,52 @@ SurfaceReport surface_report(const mesh::GarmentMesh& garment) {
   }
   for (Eigen::Index i = 0; i < faces.size(); ++i) used[faces.data()[i]] = 1;
   report.euler = static_cast<int>(std::count(used.begin(), used.end(), 1)) - static_cast<int>(edges) + static_cast<int>(faces.rows());
-  // Border edges, walked with the surface on the left.
-  std::map<int, std::vector<std::pair<int, double>>> next;
+  // Border edges, walked with the surface on the left; against that only where faces that are sewn together look different ways.
+  struct Side {
+    int other;
+    double length;
+    std::size_t edge;
+  };
+  struct Ways {
+    std::vector<Side> forward, backward;
+  };
+  std::map<int, Ways> ways;
+  std::size_t border_edges = 0;
   for (Eigen::Index f = 0; f < faces.rows(); ++f) {
     for (int k = 0; k < 3; ++k) {
       const int a = faces(f, k), b = faces(f, (k + 1) % 3);
       const auto range = std::equal_range(keys.begin(), keys.end(), key(a, b));
       if (range.second - range.first != 1) continue;
-      next[a].emplace_back(b, (garment.uv.row(garment.faces(f, k)) - garment.uv.row(garment.faces(f, (k + 1) % 3))).norm());
+      const double length = (garment.uv.row(garment.faces(f, k)) - garment.uv.row(garment.faces(f, (k + 1) % 3))).norm();
+      ways[a].forward.push_back({b, length, border_edges});
+      ways[b].backward.push_back({a, length, border_edges++});
     }
   }
-  for (auto& [particle_id, ways] : next) std::sort(ways.begin(), ways.end());
-  while (!next.empty()) {
-    const int start = next.begin()->first;
-    int current = start;
-    double length = 0;
-    while (true) {
-      const auto it = next.find(current);
-      if (it == next.end()) break;
-      current = it->second.back().first;
-      length += it->second.back().second;
-      it->second.pop_back();
-      if (it->second.empty()) next.erase(it);
-      if (current == start) break;
+  for (auto& [particle_id, sides] : ways) {
+    for (auto* list : {&sides.forward, &sides.backward}) std::sort(list->begin(), list->end(), [](const Side& p, const Side& q) { return p.other < q.other; });
+  }
+  std::vector<char> walked(border_edges, 0);
+  const auto next = [&](Ways& sides) -> const Side* {
+    for (auto* list : {&sides.forward, &sides.backward}) {
+      for (auto side = list->rbegin(); side != list->rend(); ++side) {
+        if (!walked[side->edge]) return &*side;
+      }
     }
-    report.opening_lengths.push_back(length);
+    return nullptr;
+  };
+  for (auto& [start, sides] : ways) {
+    while (next(sides) != nullptr) {
+      int current = start;
+      double length = 0;
+      do {
+        const Side* side = next(ways.at(current));
+        if (side == nullptr) break;
+        walked[side->edge] = 1;
+        length += side->length;
+        current = side->other;
+      } while (current != start);
+      report.opening_lengths.push_back(length);
+    }
   }
   std::sort(report.opening_lengths.rbegin(), report.opening_lengths.rend());
   report.openings = static_cast<int>(report.opening_lengths.size());
