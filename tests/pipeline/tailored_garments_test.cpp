@@ -103,6 +103,14 @@ TEST(jacket, shell_is_one_piece_with_three_openings_and_the_drafted_lengths) {
   expect_surface(sewn.garment, {2689, 231, 231});
 }
 
+TEST(jacket, ease_of_the_caps_lies_at_their_top_on_both_sides) {
+  const auto sewn = checked(tailor::sew(panels_of("jacket", 0.01), seams_of("jacket")));
+  std::map<std::string, double> steepest;
+  for (const auto& seam : sewn.seams) steepest[seam.name] = seam.steepest;
+  // 148.69 mm from the top to the front pitch point, 9.04 mm of them to be eased in.
+  for (const char* name : {"armhole_left", "armhole_right"}) EXPECT_NEAR(steepest.at(name), 148.69 / (148.69 - 9.04), 0.002) << name;
+}
+
 TEST(jacket, seams_in_any_order_give_the_same_bytes) {
   expect_same_bytes_in_any_order(panels_of("jacket", 0.025), seams_of("jacket"));
 }
