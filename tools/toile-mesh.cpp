@@ -16,13 +16,15 @@ struct MeshStage {
 
   static stage::Description description() {
     return {.name = "toile-mesh",
-            .version = 2,
+            .version = 3,
             .summary = "Cuts the panels of a pattern into particle grids along warp and weft.",
             .example = "toile-mesh samples/patterns/tee.yaml -o panels.ply --cell '10 mm'",
             .details = "Grid nodes stand at the crossings of warp and weft lines inside the panel; the border is sampled on the true curves, on "
                        "grid lines where that keeps the spacing even; the strip between is triangulated without slivers. Named edges become runs "
-                       "of vertices, named points and notches become vertices. The summary gives the distribution of the triangles' smallest "
-                       "angles and the mesh area beside the area inside the true curves. docs/tailoring.md says how it is done.",
+                       "of vertices, named points and notches become vertices. Internal lines become edges (--lines '[\"*.*\"]' takes all of them) or are "
+                       "cut: closed ones out, open ones open. The summary gives the distribution of the triangles' smallest "
+                       "angles and the mesh area beside the area inside the true curves, with --json for each panel too. docs/tailoring.md says how "
+                       "it is done.",
             .inputs = {{.name = "pattern", .doc = "pattern (YAML)", .kind = stage::FileKind::pattern}},
             .output = stage::FileKind::garment};
   }
@@ -76,11 +78,30 @@ struct MeshStage {
                 "use smaller cells, or cells of more equal sides", Category::check});
     }
     const Eigen::VectorXd areas = mesh::rest_areas(*garment);
+    std::vector<double> panel_area(garment->panels.size(), 0);
+    std::vector<int> panel_faces(garment->panels.size(), 0);
+    for (Eigen::Index f = 0; f < areas.size(); ++f) {
+      panel_area[static_cast<std::size_t>(garment->face_panel[f])] += areas[f];
+      ++panel_faces[static_cast<std::size_t>(garment->face_panel[f])];
+    }
     for (const auto& panel : garment->panels) {
-      double area = 0;
-      for (Eigen::Index f = 0; f < areas.size(); ++f) area += garment->face_panel[f] == panel.id ? areas[f] : 0;
-      if (std::abs(area / panel.cut_area - 1) > 0.01) {
-        run.warn({"coarse_grid", {.file = path, .item = panel.name}, fmt::format("the mesh area is {:+.1f} % off the area inside the true outline", 100 * (area / panel.cut_area - 1)), "use smaller cells for this panel", Category::check});
+      const double off = panel_area[static_cast<std::size_t>(panel.id)] / panel.cut_area - 1;
+      if (std::abs(off) > 0.01) {
+        run.warn({"coarse_grid", {.file = path, .item = panel.name}, fmt::format("the mesh area is {:+.1f} % off the area inside the true outline", 100 * off), "use smaller cells for this panel", Category::check});
+      }
+    }
+    if (run.json()) {
+      const auto reports = tailor::panel_angle_reports(*garment);
+      for (const auto& panel : garment->panels) {
+        const auto id = static_cast<std::size_t>(panel.id);
+        const std::string key = "panels." + panel.name + ".";
+        run.report(key + "faces", panel_faces[id]);
+        run.report(key + "cut_area", panel.cut_area, "m2");
+        run.report(key + "area_error", panel_area[id] / panel.cut_area - 1, "1");
+        run.report(key + "smallest_angle", reports[id].least, "deg");
+        run.report(key + "smallest_angle_1_percent", reports[id].percent_1, "deg");
+        run.report(key + "smallest_angle_median", reports[id].median, "deg");
+        run.report(key + "angles_below_20", reports[id].below_20);
       }
     }
     return stage::Output{std::move(*garment), {}, {}};

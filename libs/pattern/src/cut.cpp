@@ -1,5 +1,6 @@
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -168,6 +169,7 @@ CutPanel unfolded(CutPanel panel, const std::string& fold_name) {
         });
     if (inside_fold) continue;
     line.name += "_m";
+    line.reflected = true;
     panel.lines.push_back(line);
   }
   for (PanelPoint& point : other.points) {
@@ -305,7 +307,7 @@ Result<std::vector<CutPanel>> cut_panels(const Pattern& pattern) {
     for (const InternalLine& line : piece.lines) {
       std::vector<Segment> segments;
       for (const Segment& segment : line.segments) segments.push_back(map(segment));
-      panel.lines.push_back({line.name, line.kind, Curve(std::move(segments))});
+      panel.lines.push_back({line.name, line.kind, Curve(std::move(segments)), false});
     }
     for (const auto& [name, p] : piece.points) panel.points.push_back({.name = name, .at = map(p)});
     for (const Mark& mark : piece.marks) panel.marks.push_back({mark.name, mark.kind, map(mark.at)});
@@ -320,6 +322,7 @@ Result<std::vector<CutPanel>> cut_panels(const Pattern& pattern) {
         Similarity mirror;
         mirror.linear << -1, 0, 0, 1;
         one = mapped(one, mirror);
+        for (PanelLine& line : one.lines) line.reflected = !line.reflected;
         orient(one);
       }
       complete(one);
@@ -327,6 +330,154 @@ Result<std::vector<CutPanel>> cut_panels(const Pattern& pattern) {
     }
   }
   return panels;
+}
+
+namespace {
+
+/// Arc lengths at which a closed curve turns by more than 60 degrees, ascending in [0, length).
+std::vector<double> sharp_corners(const Curve& curve) {
+  std::vector<double> corners;
+  const std::vector<double>& starts = curve.segment_starts();
+  const double length = curve.length(), step = 1e-6 * length;
+  for (std::size_t k = 0; k + 1 < starts.size(); ++k) {
+    const double s = starts[k];
+    const Point2 here = curve.point_at(s), in = here - curve.point_at(k == 0 ? length - step : s - step), out = curve.point_at(s + step) - here;
+    if (std::abs(std::atan2(cross(in, out), in.dot(out))) > std::numbers::pi / 3) corners.push_back(s);
+  }
+  return corners;
+}
+
+/// The edges of a hole that one closed line bounds, in the line's direction.
+std::vector<PanelEdge> edges_of(const PanelLine& line) {
+  std::vector<Segment> segments = line.curve.segments();
+  segments.back().to = segments.front().from;
+  const Curve curve(std::move(segments));
+  const std::vector<double> corners = sharp_corners(curve);
+  if (corners.empty()) return {{line.name, "", "", curve, 0}};
+  std::vector<PanelEdge> edges;
+  for (std::size_t k = 0; k < corners.size(); ++k) {
+    const bool last = k + 1 == corners.size();
+    std::vector<Segment> part = curve.part(corners[k], last ? curve.length() : corners[k + 1]).segments();
+    if (last && corners.front() > 0) {
+      const std::vector<Segment> rest = curve.part(0, corners.front()).segments();
+      part.insert(part.end(), rest.begin(), rest.end());
+    }
+    part.front().from = edges.empty() ? part.front().from : edges.back().curve.to();
+    if (last) part.back().to = edges.empty() ? part.front().from : edges.front().curve.from();
+    edges.push_back({corners.size() == 1 ? line.name : fmt::format("{}_{}", line.name, k + 1), "", "", Curve(std::move(part)), 0});
+  }
+  return edges;
+}
+
+/// Closed chains of open lines: for each the lines in order, the first in its own direction.
+std::vector<std::vector<std::pair<std::size_t, bool>>> chains(const std::vector<PanelLine>& lines, const std::vector<std::size_t>& open) {
+  // Ends that meet are one node; lines with a loose end are taken away until none is left.
+  std::vector<Point2> nodes;
+  std::vector<std::array<std::size_t, 2>> ends;
+  for (std::size_t l : open) {
+    std::array<std::size_t, 2> own{};
+    for (std::size_t e = 0; e < 2; ++e) {
+      const Point2 p = e == 0 ? lines[l].curve.from() : lines[l].curve.to();
+      own[e] = static_cast<std::size_t>(std::find_if(nodes.begin(), nodes.end(), [&](const Point2& n) { return (n - p).norm() <= on_edge_tolerance; }) - nodes.begin());
+      if (own[e] == nodes.size()) nodes.push_back(p);
+    }
+    ends.push_back(own);
+  }
+  std::vector<char> alive(open.size(), 1);
+  const auto degree = [&](std::size_t node) {
+    int count = 0;
+    for (std::size_t k = 0; k < open.size(); ++k) count += alive[k] ? (ends[k][0] == node) + (ends[k][1] == node) : 0;
+    return count;
+  };
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (std::size_t k = 0; k < open.size(); ++k) {
+      if (!alive[k] || (degree(ends[k][0]) > 1 && degree(ends[k][1]) > 1)) continue;
+      alive[k] = 0;
+      changed = true;
+    }
+  }
+  std::vector<std::vector<std::pair<std::size_t, bool>>> result;
+  for (std::size_t first = 0; first < open.size(); ++first) {
+    if (!alive[first]) continue;
+    std::vector<std::pair<std::size_t, bool>> chain{{open[first], false}};
+    std::vector<std::size_t> members{first};
+    std::size_t at = ends[first][1];
+    bool simple = degree(ends[first][0]) == 2;
+    while (simple && at != ends[first][0]) {
+      simple = degree(at) == 2;
+      for (std::size_t k = 0; simple && k < open.size(); ++k) {
+        if (!alive[k] || std::find(members.begin(), members.end(), k) != members.end() || (ends[k][0] != at && ends[k][1] != at)) continue;
+        const bool backwards = ends[k][1] == at;
+        chain.emplace_back(open[k], backwards);
+        members.push_back(k);
+        at = ends[k][backwards ? 0 : 1];
+        break;
+      }
+    }
+    for (std::size_t k : members) alive[k] = 0;
+    if (simple) result.push_back(std::move(chain));
+  }
+  return result;
+}
+
+}  // namespace
+
+Result<CutPanel> cut_out(const CutPanel& source, const std::vector<std::string>& names) {
+  CutPanel panel = source;
+  std::vector<PanelHole> fresh;
+  std::vector<char> gone(source.lines.size(), 0);
+  std::vector<std::size_t> open;
+  for (std::size_t l = 0; l < source.lines.size(); ++l) {
+    const PanelLine& line = source.lines[l];
+    if (std::find(names.begin(), names.end(), line.name) == names.end()) continue;
+    if (!line.closed()) {
+      open.push_back(l);
+      continue;
+    }
+    fresh.push_back({line.name, edges_of(line)});
+    gone[l] = 1;
+  }
+  for (const auto& chain : chains(source.lines, open)) {
+    PanelHole hole{source.lines[chain.front().first].name, {}};
+    for (const auto& [l, backwards] : chain) {
+      gone[l] = 1;
+      PanelEdge edge{source.lines[l].name, "", "", source.lines[l].curve, 0};
+      if (backwards) edge = reversed(edge);
+      if (!hole.edges.empty()) {
+        std::vector<Segment> segments = edge.curve.segments();
+        segments.front().from = hole.edges.back().curve.to();
+        edge.curve = Curve(std::move(segments));
+      }
+      hole.edges.push_back(std::move(edge));
+    }
+    std::vector<Segment> segments = hole.edges.back().curve.segments();
+    segments.back().to = hole.edges.front().curve.from();
+    hole.edges.back().curve = Curve(std::move(segments));
+    fresh.push_back(std::move(hole));
+  }
+  Issues issues;
+  panel.lines.clear();
+  for (std::size_t l = 0; l < source.lines.size(); ++l) {
+    if (!gone[l]) panel.lines.push_back(source.lines[l]);
+  }
+  for (PanelHole& hole : fresh) {
+    if (loop_area(hole.edges) > 0) reverse_loop(hole.edges);
+    for (const PanelEdge& edge : hole.edges) {
+      const bool line = std::any_of(panel.lines.begin(), panel.lines.end(), [&](const PanelLine& other) { return other.name == edge.name; });
+      if (line || find_edge(panel, edge.name)) {
+        issues.push_back({"duplicate_name", {.item = panel.name + "." + hole.name}, fmt::format("cutting it out gives an edge '{}', but there is one", edge.name), "rename one of them"});
+      }
+    }
+    std::vector<Curve> curves;
+    for (const PanelEdge& edge : hole.edges) curves.push_back(edge.curve);
+    const Polyline loop = flatten(curves, 1e-6);
+    std::erase_if(panel.marks, [&](const PanelMark& mark) { return winds_around(loop, mark.at) && distance_to(loop, mark.at) > on_edge_tolerance; });
+    panel.holes.push_back(std::move(hole));
+  }
+  if (!issues.empty()) return issues;
+  if (!fresh.empty()) complete(panel);
+  return panel;
 }
 
 }  // namespace toile::pattern

@@ -60,16 +60,17 @@ struct Patch {
   std::vector<Triple> triangles;
   std::set<std::pair<int, int>> border;       ///< edges on the border of the panel
   std::set<std::pair<int, int>> constraints;
+  std::vector<std::array<int, 3>> split_constraints;  ///< edge a, b that became a, m and m, b
 
   bool locked(int a, int b) const { return border.count(ordered(a, b)) || constraints.count(ordered(a, b)); }
 
-  /// Smallest angle that counts: not those between two border edges.
+  /// Smallest angle that counts: not those between two edges of border or constraints.
   double quality(const Triple& t) const {
     const auto all = angles(vertices[t[0]].p, vertices[t[1]].p, vertices[t[2]].p);
     if (all[0] < 0) return -1;
     double least = 180;
     for (int k = 0; k < 3; ++k) {
-      if (all[k] < least && !(border.count(ordered(t[k], t[(k + 1) % 3])) && border.count(ordered(t[k], t[(k + 2) % 3])))) least = all[k];
+      if (all[k] < least && !(locked(t[k], t[(k + 1) % 3]) && locked(t[k], t[(k + 2) % 3]))) least = all[k];
     }
     return least;
   }
@@ -105,6 +106,15 @@ struct Patch {
     }
     std::sort(result.begin(), result.end());
     result.erase(std::unique(result.begin(), result.end()), result.end());
+    return result;
+  }
+  /// Before and behind a vertex that slides.
+  std::vector<int> line_neighbours(int v) const {
+    std::vector<int> result = border_neighbours(v);
+    if (!result.empty()) return result;
+    for (int w : neighbours(v)) {
+      if (constraints.count(ordered(v, w))) result.push_back(w);
+    }
     return result;
   }
   std::vector<int> border_neighbours(int v) const {
@@ -204,8 +214,8 @@ bool move_vertices(Patch& patch, const ImproveOptions& options) {
     if (best >= options.good) continue;
     double low = 0, high = 0;
     if (vertex.mobility == Mobility::slide) {
-      // Stays between its border neighbours, at no less than a quarter of the span from either.
-      const std::vector<int> around = patch.border_neighbours(v);
+      // Stays between its neighbours on the line, at no less than a quarter of the span from either.
+      const std::vector<int> around = patch.line_neighbours(v);
       if (around.size() != 2) continue;
       const Point here = vertex.p;
       const double before = (patch.vertices[around[0]].p - here).norm(), after = (patch.vertices[around[1]].p - here).norm();
@@ -285,15 +295,14 @@ std::optional<Patch> collapsed(const Patch& patch, int v, int w) {
 }
 
 std::optional<Patch> split(const Patch& patch, int a, int b, const ImproveOptions& options) {
-  const bool on_border = patch.border.count(ordered(a, b)) > 0;
-  if (patch.constraints.count(ordered(a, b))) return std::nullopt;
+  const bool on_border = patch.border.count(ordered(a, b)) > 0, on_constraint = patch.constraints.count(ordered(a, b)) > 0;
   const LocalVertex &va = patch.vertices[a], &vb = patch.vertices[b];
   if ((va.p - vb.p).norm() < 2 * options.shortest_edge) return std::nullopt;
   LocalVertex middle;
   middle.p = 0.5 * (va.p + vb.p);
-  if (on_border) {
+  if (on_border || on_constraint) {
     if (!options.may_split_border) return std::nullopt;
-    // Halfway along the border curve; at least one end must tell which curve that is.
+    // Halfway along the line's curve; at least one end must tell which curve that is.
     const LocalVertex& known = va.mobility == Mobility::slide ? va : vb;
     if (known.mobility != Mobility::slide) return std::nullopt;
     const LocalVertex& other = &known == &va ? vb : va;
@@ -333,6 +342,12 @@ std::optional<Patch> split(const Patch& patch, int a, int b, const ImproveOption
     result.border.insert(ordered(a, m));
     result.border.insert(ordered(m, b));
   }
+  if (on_constraint) {
+    result.constraints.erase(ordered(a, b));
+    result.constraints.insert(ordered(a, m));
+    result.constraints.insert(ordered(m, b));
+    result.split_constraints.push_back({a, b, m});
+  }
   return result;
 }
 
@@ -367,6 +382,11 @@ std::vector<int> commit(LocalMesh& mesh, const std::vector<int>& old_triangles, 
       mesh.stars.emplace_back();
     }
   }
+  for (const auto& [a, b, m] : patch.split_constraints) {
+    mesh.constraints.erase(ordered(global[a], global[b]));
+    mesh.constraints.insert(ordered(global[a], global[m]));
+    mesh.constraints.insert(ordered(global[m], global[b]));
+  }
   std::vector<int> slots = old_triangles;
   for (int t : old_triangles) set_triangle(mesh, t, {-1, -1, -1});
   while (slots.size() < patch.triangles.size()) {
@@ -389,7 +409,8 @@ double quality_in(const LocalMesh& mesh, int t) {
   double counted = 180;
   for (int k = 0; k < 3; ++k) {
     // Only a small angle can be the outline's own; the look-up is skipped for the others.
-    const bool outline = all[k] == least && faces_with_edge(mesh, v[k], v[(k + 1) % 3]) == 1 && faces_with_edge(mesh, v[k], v[(k + 2) % 3]) == 1;
+    const auto line = [&](int w) { return faces_with_edge(mesh, v[k], w) == 1 || mesh.constraints.count(ordered(v[k], w)) > 0; };
+    const bool outline = all[k] == least && line(v[(k + 1) % 3]) && line(v[(k + 2) % 3]);
     if (!outline) counted = std::min(counted, all[k]);
   }
   return counted;
@@ -462,6 +483,8 @@ void improve(LocalMesh& mesh, const ImproveOptions& options) {
     pending = std::move(touched);
   }
 }
+
+void replace_triangle(LocalMesh& mesh, int triangle, const Triple& vertices) { set_triangle(mesh, triangle, vertices); }
 
 int split_edge(LocalMesh& mesh, int a, int b, const LocalVertex& vertex) {
   std::vector<int> found;

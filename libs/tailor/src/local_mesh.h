@@ -23,7 +23,7 @@ enum class Mobility : unsigned char {
 struct LocalVertex {
   Point p = Point::Zero();
   Mobility mobility = Mobility::free;
-  int curve = -1;  ///< curve of a border vertex that is no corner
+  int curve = -1;  ///< curve of a vertex that slides
   double s = 0;    ///< place on that curve
 };
 
@@ -52,8 +52,11 @@ struct ImproveOptions {
 };
 
 /// Raises the smallest angles by edge flips, moving vertices, removing and inserting them. Only the neighbourhoods of
-/// bad triangles change. An angle between two border edges belongs to the outline and does not count.
+/// bad triangles change. An angle between two border edges or constraints belongs to the outline and does not count.
 void improve(LocalMesh& mesh, const ImproveOptions& options);
+
+/// Gives a triangle other vertices.
+void replace_triangle(LocalMesh& mesh, int triangle, const Triple& vertices);
 
 /// Puts a vertex into an edge and cuts the triangles at it; returns the vertex. Precondition: the edge exists.
 int split_edge(LocalMesh& mesh, int a, int b, const LocalVertex& vertex);

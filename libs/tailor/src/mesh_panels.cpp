@@ -1,6 +1,7 @@
 #include "toile/tailor/mesh_panels.h"
 
 #include "panel_grid.h"
+#include "wildcard.h"
 
 #include "toile/base/parallel.h"
 #include "toile/base/text.h"
@@ -65,7 +66,9 @@ Result<mesh::GarmentMesh> mesh_panels(const std::vector<pattern::CutPanel>& all_
     GridSettings grid;
     grid.cell_warp = params.cell_warp.value_or(params.cell);
     grid.cell_weft = params.cell_weft.value_or(params.cell);
-    Diagonal diagonal = params.diagonal;
+    grid.diagonal = params.diagonal;
+    grid.mesher = params.mesher;
+    grid.turn = params.turn;
     // What is said of the panel itself goes before what is said of its piece.
     for (const std::string& name : {panel->piece, panel->name}) {
       const auto found = params.panels.find(name);
@@ -74,29 +77,48 @@ Result<mesh::GarmentMesh> mesh_panels(const std::vector<pattern::CutPanel>& all_
       if (own.cell) grid.cell_warp = grid.cell_weft = *own.cell;
       if (own.cell_warp) grid.cell_warp = *own.cell_warp;
       if (own.cell_weft) grid.cell_weft = *own.cell_weft;
-      if (own.diagonal) diagonal = *own.diagonal;
+      grid.diagonal = own.diagonal.value_or(grid.diagonal);
+      grid.mesher = own.mesher.value_or(grid.mesher);
+      grid.turn = own.turn.value_or(grid.turn);
     }
-    grid.alternating = diagonal == Diagonal::alternating;
     settings.push_back(grid);
   }
-  for (const std::string& reference : params.lines) {
-    const auto dot = reference.find('.');
-    bool used = false;
-    for (std::size_t p = 0; p < panels.size() && dot != std::string::npos; ++p) {
-      if (!is_for(reference.substr(0, dot), *panels[p])) continue;
-      for (const auto& line : panels[p]->lines) {
-        if (line.name != reference.substr(dot + 1)) continue;
-        settings[p].lines.push_back(line.name);
-        used = true;
+  std::vector<std::set<std::string>> lines(panels.size()), named(panels.size());
+  const auto ask = [&](const std::vector<std::string>& references, const char* key, const auto& take) {
+    for (const std::string& reference : references) {
+      const auto dot = reference.find('.');
+      bool used = false;
+      for (std::size_t p = 0; p < panels.size() && dot != std::string::npos; ++p) {
+        const std::string panel = reference.substr(0, dot), name = reference.substr(dot + 1);
+        if (!fits(panel, panels[p]->name) && !fits(panel, panels[p]->piece)) continue;
+        for (const auto& line : panels[p]->lines) {
+          if (!fits(name, line.name)) continue;
+          used |= take(p, line, has_wildcard(name));
+          if (!has_wildcard(reference)) named[p].insert(line.name);
+        }
       }
-    }
-    if (!used) {
+      if (used || has_wildcard(reference)) continue;
       std::vector<std::string> candidates;
       for (const auto* panel : panels) {
         for (const auto& line : panel->lines) candidates.push_back(panel->name + "." + line.name);
       }
-      issues.push_back({"unknown_line", {.item = "lines"}, fmt::format("there is no internal line '{}'", reference), suggestion(reference, candidates)});
+      issues.push_back({"unknown_line", {.item = key}, fmt::format("there is no internal line '{}'", reference), suggestion(reference, candidates)});
     }
+  };
+  ask(params.lines, "lines", [&](std::size_t p, const pattern::PanelLine& line, bool) {
+    lines[p].insert(line.name);
+    return true;
+  });
+  ask(params.cut, "cut", [&](std::size_t p, const pattern::PanelLine& line, bool any) {
+    if (any && line.kind != pattern::LineKind::cut && line.kind != pattern::LineKind::dart) return false;
+    lines[p].insert(line.name);
+    if (std::find(settings[p].cut.begin(), settings[p].cut.end(), line.name) == settings[p].cut.end()) settings[p].cut.push_back(line.name);
+    return true;
+  });
+  std::vector<pattern::CutPanel> work;
+  for (std::size_t p = 0; p < panels.size(); ++p) {
+    work.push_back(*panels[p]);
+    std::erase_if(work.back().lines, [&](const auto& line) { return lines[p].count(line.name) == 0; });
   }
   if (!issues.empty()) return issues;
 
@@ -106,7 +128,8 @@ Result<mesh::GarmentMesh> mesh_panels(const std::vector<pattern::CutPanel>& all_
     if (!panels[p]->mirrored) continue;
     for (std::size_t q = 0; q < panels.size() && twin[p] < 0; ++q) {
       const bool same_grid = settings[p].cell_warp == settings[q].cell_warp && settings[p].cell_weft == settings[q].cell_weft &&
-                             settings[p].alternating == settings[q].alternating && settings[p].lines == settings[q].lines;
+                             settings[p].diagonal == settings[q].diagonal && settings[p].mesher == settings[q].mesher && settings[p].turn == settings[q].turn &&
+                             settings[p].cut == settings[q].cut && lines[p] == lines[q];
       if (panels[q]->piece == panels[p]->piece && !panels[q]->mirrored && same_grid) twin[p] = static_cast<int>(q);
     }
   }
@@ -114,11 +137,19 @@ Result<mesh::GarmentMesh> mesh_panels(const std::vector<pattern::CutPanel>& all_
   std::vector<PanelMesh> meshes(panels.size());
   parallel_for(panels.size(), 1, [&](std::size_t p) {
     if (twin[p] >= 0) return;
-    auto mesh = mesh_panel(*panels[p], settings[p]);
+    auto mesh = mesh_panel(work[p], settings[p]);
     if (mesh) meshes[p] = std::move(*mesh);
     else troubles[p] = mesh.issues();
   });
   for (const Issues& trouble : troubles) append(issues, trouble);
+  if (!issues.empty()) return issues;
+  for (std::size_t p = 0; p < panels.size(); ++p) {
+    if (twin[p] >= 0) continue;
+    for (const std::string& line : named[p]) {
+      const bool there = std::any_of(meshes[p].runs.begin(), meshes[p].runs.end(), [&](const GridRun& run) { return run.name == line || run.name.starts_with(line + "_"); });
+      if (!there) issues.push_back({"line_cut_away", {.item = panels[p]->name + "." + line}, "the line lies in what is cut out", "leave it out"});
+    }
+  }
   if (!issues.empty()) return issues;
   for (std::size_t p = 0; p < panels.size(); ++p) {
     if (twin[p] >= 0) meshes[p] = mirrored(meshes[static_cast<std::size_t>(twin[p])]);
@@ -149,7 +180,7 @@ Result<mesh::GarmentMesh> mesh_panels(const std::vector<pattern::CutPanel>& all_
     row.mirrored = panels[p]->mirrored;
     row.cell_warp = settings[p].cell_warp;
     row.cell_weft = settings[p].cell_weft;
-    row.cut_area = panels[p]->area;
+    row.cut_area = meshes[p].area;
     row.allowance_area = panels[p]->allowance_area;
     garment.panels.push_back(row);
     garment.uv.middleRows(v0, mesh.uv.rows()) = mesh.uv;

@@ -1,5 +1,8 @@
 #include "panel_grid.h"
 
+#include "cut_open.h"
+#include "delaunay_points.h"
+#include "line_network.h"
 #include "local_mesh.h"
 #include "triangulate.h"
 
@@ -18,9 +21,8 @@ using pattern::Curve;
 
 constexpr double border_clearance = 0.6;  ///< grid nodes keep this distance from border, lines and marks [cells]
 constexpr double same_place = 1e-7;       ///< [cells]
-constexpr double same_point = 1e-6;       ///< a named point this near to an edge's end is that end [m]
 constexpr double on_axis = 1e-9;          ///< a fold line this straight up or across is a grid line [m]
-constexpr const char* fold_edge = "(fold)";
+constexpr const char* fold_edge = "(fold)";  ///< the edges of half a panel along its fold begin with this
 constexpr double sharp_turn = 0.35;       ///< a curve that turns this much at once has a corner there [rad]
 
 /// (u, v) in metres to cells and back. The grid starts at the panel's left and lower end (on the fold if there is one):
@@ -33,13 +35,14 @@ struct Cells {
   double reference() const { return std::sqrt(weft * warp); }
 };
 
-struct Line {
-  const Curve* curve = nullptr;
-  std::string name;
-  bool internal = false;
-  std::vector<double> fixed;  ///< arc lengths that must be vertices, ascending; begins with 0, ends with the length
-  double allowance = 0;
-};
+/// Whether an internal line is to be cut; the parts of one that holes divide are `line_1`, `line_2`, ...
+bool is_cut(const GridSettings& settings, const pattern::CutPanel& panel, const std::string& line) {
+  const auto whole = [&](const std::string& name) { return std::any_of(panel.lines.begin(), panel.lines.end(), [&](const auto& other) { return other.name == name; }); };
+  return std::any_of(settings.cut.begin(), settings.cut.end(), [&](const std::string& name) {
+    if (line == name) return true;
+    return line.starts_with(name + "_") && !whole(name) && line.find_first_not_of("0123456789", name.size() + 1) == std::string::npos;
+  });
+}
 
 struct Sample {
   double s = 0;
@@ -56,8 +59,10 @@ double distance_to_segment(const Point& p, const Point& a, const Point& b) {
 
 /// Samples a curve about one cell apart (closer where it bends sharply), at grid-line crossings where that keeps the
 /// spacing even. The number of samples depends on lengths only, so that equally long edges get equally many.
-std::vector<Sample> sample_line(const Line& line, const Cells& cells) {
-  const Curve& curve = *line.curve;
+/// fixed   arc lengths that must be samples, ascending; begins with 0, ends with the length
+/// spans   least number of samples' spans between each two of them
+/// turn    largest turn from sample to sample [rad], unless that needs more than four samples a cell
+std::vector<Sample> sample_line(const Curve& curve, const std::vector<double>& fixed, const std::vector<int>& least_spans, const Cells& cells, double turn_limit) {
   // Fine table: arc length, position, and arc length measured in local sample spacings.
   const double fine = cells.reference() / 8;
   struct Row {
@@ -67,8 +72,8 @@ std::vector<Sample> sample_line(const Line& line, const Cells& cells) {
   };
   std::vector<Row> table;
   std::vector<std::size_t> fixed_rows;
-  for (std::size_t k = 0; k + 1 < line.fixed.size(); ++k) {
-    const double s0 = line.fixed[k], s1 = line.fixed[k + 1];
+  for (std::size_t k = 0; k + 1 < fixed.size(); ++k) {
+    const double s0 = fixed[k], s1 = fixed[k + 1];
     const int steps = std::max(8, static_cast<int>(std::ceil((s1 - s0) / fine)));
     if (k == 0) fixed_rows.push_back(0), table.push_back({s0, cells(curve.point_at(s0))});
     for (int i = 1; i <= steps; ++i) {
@@ -77,12 +82,11 @@ std::vector<Sample> sample_line(const Line& line, const Cells& cells) {
     }
     fixed_rows.push_back(table.size() - 1);
   }
-  // No sample spacing turns by more than 0.6 rad unless that needs more than four samples a cell.
   for (std::size_t i = 1; i + 1 < table.size(); ++i) {
     const Point a = table[i].p - table[i - 1].p, b = table[i + 1].p - table[i].p;
     const double turn = std::abs(std::atan2(a.x() * b.y() - a.y() * b.x(), a.dot(b)));
     const double length = 0.5 * (a.norm() + b.norm());
-    if (turn < sharp_turn && turn > 0.6 * length) table[i].size = std::clamp(0.6 * length / turn, 0.25, 1.0);
+    if (turn < sharp_turn && turn > turn_limit * length) table[i].size = std::clamp(turn_limit * length / turn, 0.25, 1.0);
   }
   for (std::size_t i = 1; i < table.size(); ++i) table[i].size = std::min(table[i].size, table[i - 1].size + 0.25 * (table[i].p - table[i - 1].p).norm());
   for (std::size_t i = table.size() - 1; i-- > 0;) table[i].size = std::min(table[i].size, table[i + 1].size + 0.25 * (table[i].p - table[i + 1].p).norm());
@@ -95,9 +99,7 @@ std::vector<Sample> sample_line(const Line& line, const Cells& cells) {
     const std::size_t r0 = fixed_rows[k], r1 = fixed_rows[k + 1];
     samples.push_back({table[r0].s, table[r0].p, true});
     const double c0 = table[r0].count, total = table[r1].count - c0;
-    int spans = std::max(1, static_cast<int>(std::lround(total)));
-    const bool closed = line.fixed.size() == 2 && (table[r0].p - table[r1].p).norm() < same_place;
-    if (closed) spans = std::max(spans, 6);
+    const int spans = std::max(least_spans[k], static_cast<int>(std::lround(total)));
     if (spans == 1) continue;
 
     struct Candidate {
@@ -190,206 +192,21 @@ struct Grid {
   bool has(int i, int j) const { return i >= i0 && j >= j0 && i < i0 + ni && j < j0 + nj; }
 };
 
-Result<PanelMesh> mesh_whole(const pattern::CutPanel& panel, const GridSettings& settings, const std::optional<std::pair<Point, Point>>& fold) {
-  const auto trouble = [&](Issue issue) {
-    issue.place.item = panel.name;
-    return issue;
-  };
-  Cells cells;
-  cells.weft = settings.cell_weft;
-  cells.warp = settings.cell_warp;
+/// A cell of the grid that is cut by one diagonal; vertices from its lower left, counter-clockwise.
+struct Cell {
+  int i = 0, j = 0;
+  std::array<int, 4> v{};
+};
 
-  // Lines: the loops' edges, then internal lines.
-  std::vector<Line> lines;
-  std::vector<std::vector<int>> loops;
-  const auto add_loop = [&](const std::vector<pattern::PanelEdge>& edges) {
-    loops.emplace_back();
-    for (const auto& edge : edges) {
-      loops.back().push_back(static_cast<int>(lines.size()));
-      lines.push_back({&edge.curve, edge.name, false, {}, edge.allowance});
-    }
-  };
-  add_loop(panel.outline);
-  for (const auto& hole : panel.holes) add_loop(hole.edges);
-  const std::size_t border_lines = lines.size();
-  for (const auto& line : panel.lines) {
-    if (std::find(settings.lines.begin(), settings.lines.end(), line.name) != settings.lines.end()) lines.push_back({&line.curve, line.name, true, {}});
-  }
-
-  Point low = Point::Constant(std::numeric_limits<double>::infinity()), high = -low;
-  for (std::size_t l = 0; l < border_lines; ++l) {
-    for (double s : lines[l].curve->sample(0.1 * cells.reference())) {
-      const Point p = lines[l].curve->point_at(s);
-      low = low.cwiseMin(p);
-      high = high.cwiseMax(p);
-    }
-  }
-  cells.origin = low;
-  if (fold && std::abs(fold->first.x() - fold->second.x()) < on_axis) cells.origin.x() = fold->first.x();
-  if (fold && std::abs(fold->first.y() - fold->second.y()) < on_axis) cells.origin.y() = fold->first.y();
-  {
-    const Point extent = cells(high) - cells(low);
-    if (extent.x() * extent.y() > 5e8) return trouble({"fine_grid", {}, fmt::format("{:.0f} x {:.0f} cells are too many", extent.x(), extent.y()), "choose larger cells"});
-  }
-
-  // Points that must be vertices: on a line by arc length, otherwise inside.
-  struct Wanted {
-    std::string name;
-    Point at;
-    int line = -1;
-    double s = 0;
-  };
-  std::vector<Wanted> wanted;
-  std::vector<std::pair<Point, Point>> boxes;
-  for (const Line& line : lines) {
-    Point box_low = Point::Constant(std::numeric_limits<double>::infinity()), box_high = -box_low;
-    for (const auto& segment : line.curve->segments()) {
-      const auto [a, b] = pattern::bounds(segment);
-      box_low = box_low.cwiseMin(a);
-      box_high = box_high.cwiseMax(b);
-    }
-    boxes.emplace_back(box_low, box_high);
-  }
-  const auto locate = [&](Wanted& point, std::size_t line_count) {
-    double nearest = pattern::on_edge_tolerance;
-    for (std::size_t l = 0; l < line_count; ++l) {
-      const Point margin = Point::Constant(nearest);
-      if (((point.at - boxes[l].first + margin).array() < 0).any() || ((boxes[l].second - point.at + margin).array() < 0).any()) continue;
-      const auto found = lines[l].curve->nearest(point.at);
-      if (found.distance < nearest) nearest = found.distance, point.line = static_cast<int>(l), point.s = found.s;
-    }
-  };
-  std::set<std::string> used_names;
-  const auto want = [&](const std::string& name, const Point& at) {
-    if (!used_names.insert(name).second) return;
-    wanted.push_back({name, at});
-    locate(wanted.back(), lines.size());
-  };
-  for (const auto& point : panel.points) {
-    // Construction points off the cloth are of no use to the garment.
-    Wanted probe{point.name, point.at};
-    locate(probe, lines.size());
-    if (probe.line >= 0) want(point.name, point.at);
-  }
-  for (const auto& notch : panel.notches) {
-    if (!used_names.insert(notch.name).second) continue;
-    Wanted point{notch.name, notch.at};
-    for (std::size_t l = 0; l < border_lines; ++l) {
-      if (lines[l].name == notch.edge) point.line = static_cast<int>(l), point.s = notch.s;
-    }
-    wanted.push_back(point);
-  }
-  for (const auto& mark : panel.marks) want(mark.name, mark.at);
-  // Ends of internal lines that lie on the border.
-  struct LineEnd {
-    int border_line = -1;
-    double s = 0;
-  };
-  std::vector<std::array<LineEnd, 2>> line_ends(lines.size());
-  for (std::size_t l = border_lines; l < lines.size(); ++l) {
-    for (int end = 0; end < 2; ++end) {
-      Wanted probe{"", end == 0 ? lines[l].curve->from() : lines[l].curve->to()};
-      locate(probe, border_lines);
-      line_ends[l][static_cast<std::size_t>(end)] = {probe.line, probe.s};
-    }
-  }
-  for (std::size_t l = 0; l < lines.size(); ++l) {
-    Line& line = lines[l];
-    const double length = line.curve->length();
-    line.fixed = {0, length};
-    const auto fix = [&](double s) {
-      for (double& known : line.fixed) {
-        if (std::abs(known - s) < same_point) return;
-      }
-      line.fixed.push_back(s);
-    };
-    const auto& starts = line.curve->segment_starts();
-    for (std::size_t k = 1; k + 1 < starts.size(); ++k) {
-      const Point before = pattern::derivative(line.curve->segments()[k - 1], 1), after = pattern::derivative(line.curve->segments()[k], 0);
-      if (std::abs(std::atan2(before.x() * after.y() - before.y() * after.x(), before.dot(after))) > sharp_turn) fix(starts[k]);
-    }
-    for (const Wanted& point : wanted) {
-      if (point.line == static_cast<int>(l)) fix(point.s);
-    }
-    for (const auto& ends : line_ends) {
-      for (const LineEnd& end : ends) {
-        if (end.border_line == static_cast<int>(l)) fix(end.s);
-      }
-    }
-    std::sort(line.fixed.begin(), line.fixed.end());
-  }
-
-  // Vertices of the lines.
-  LocalMesh local;
-  std::vector<std::vector<std::pair<int, double>>> fixed_vertices(lines.size());
-  std::vector<std::pair<int, int>> walls, constraints;
-  const auto add_samples = [&](int l, int start, int end) {  // start, end: existing vertices or -1
-    const std::vector<Sample> samples = sample_line(lines[l], cells);
-    std::vector<int> ids;
-    for (std::size_t k = 0; k < samples.size(); ++k) {
-      int id = k == 0 ? start : k + 1 == samples.size() ? end : -1;
-      if (id < 0) {
-        id = static_cast<int>(local.vertices.size());
-        LocalVertex vertex{samples[k].p, Mobility::fixed, -1, 0};
-        if (!samples[k].fixed && !lines[l].internal) vertex = {samples[k].p, Mobility::slide, l, samples[k].s / cells.reference()};
-        local.vertices.push_back(vertex);
-      }
-      if (samples[k].fixed || lines[l].internal) fixed_vertices[l].emplace_back(id, samples[k].s);
-      ids.push_back(id);
-    }
-    return ids;
-  };
-  std::vector<std::vector<int>> loop_vertices;
-  for (const auto& loop : loops) {
-    std::vector<int> ring;
-    int current = -1;
-    int ring_start = -1;
-    for (std::size_t k = 0; k < loop.size(); ++k) {
-      const bool last = k + 1 == loop.size();
-      if (loop.size() == 1) {
-        // One closed edge: its two ends are the same vertex.
-        ring_start = static_cast<int>(local.vertices.size());
-        current = ring_start;
-        local.vertices.push_back({cells(lines[loop[k]].curve->from()), Mobility::fixed, -1, 0});
-      }
-      const std::vector<int> ids = add_samples(loop[k], current, last ? ring_start : -1);
-      if (k == 0) ring_start = ids.front();
-      current = ids.back();
-      ring.insert(ring.end(), ids.begin(), ids.end() - 1);
-    }
-    for (std::size_t k = 0; k < ring.size(); ++k) walls.emplace_back(ring[k], ring[(k + 1) % ring.size()]);
-    loop_vertices.push_back(std::move(ring));
-  }
-  const auto vertex_at = [&](int line, double s) {
-    for (const auto& [id, at] : fixed_vertices[line]) {
-      if (std::abs(at - s) < 2 * same_point) return id;
-    }
-    return -1;
-  };
-  const auto border_walls = walls.size();
-  for (std::size_t l = border_lines; l < lines.size(); ++l) {
-    std::array<int, 2> ends{-1, -1};
-    for (std::size_t e = 0; e < 2; ++e) {
-      if (line_ends[l][e].border_line >= 0) ends[e] = vertex_at(line_ends[l][e].border_line, line_ends[l][e].s);
-    }
-    const std::vector<int> ids = add_samples(static_cast<int>(l), ends[0], ends[1]);
-    for (std::size_t k = 0; k + 1 < ids.size(); ++k) constraints.emplace_back(ids[k], ids[k + 1]);
-  }
-  std::vector<GridPoint> points;
-  for (const Wanted& point : wanted) {
-    int id = -1;
-    if (point.line >= 0) {
-      id = vertex_at(point.line, point.s);
-      TOILE_CHECK(id >= 0, "named point {} is no vertex", point.name);
-    } else {
-      id = static_cast<int>(local.vertices.size());
-      local.vertices.push_back({cells(point.at), Mobility::fixed, -1, 0});
-    }
-    points.push_back({point.name, id});
-  }
+/// Fills the border with grid nodes, cells cut in two, and the strip between cells and lines.
+/// local        vertices of the lines; gets the nodes and all triangles
+/// border       the border's edges; obstacles: these, internal edges, and single points
+/// walls        the border's edges as vertex pairs; constraints: the internal ones
+/// cells        the regular cells are appended
+Issues fill_with_cells(LocalMesh& local, const std::vector<std::pair<Point, Point>>& border, const std::vector<std::pair<Point, Point>>& obstacles, std::vector<std::pair<int, int>> walls,
+                       const std::vector<std::pair<int, int>>& constraints, Diagonal diagonal, std::vector<Cell>& cells) {
   const std::size_t line_vertices = local.vertices.size();
-
-  // Grid nodes that keep clear of all of these.
+  // Grid nodes that keep clear of what is there.
   Grid grid;
   {
     Point box_low = Point::Constant(std::numeric_limits<double>::infinity()), box_high = -box_low;
@@ -418,17 +235,11 @@ Result<PanelMesh> mesh_whole(const pattern::CutPanel& panel, const GridSettings&
       }
     }
   };
-  const auto all_segments = [&](const auto& visit) {
-    for (std::size_t w = 0; w < border_walls; ++w) visit(local.vertices[walls[w].first].p, local.vertices[walls[w].second].p);
-    for (const auto& [a, b] : constraints) visit(local.vertices[a].p, local.vertices[b].p);
-    for (const GridPoint& point : points) visit(local.vertices[point.vertex].p, local.vertices[point.vertex].p);
-  };
-  all_segments(obstacle);
+  for (const auto& [a, b] : obstacles) obstacle(a, b);
   // Scan lines at node rows and at cell middles.
   const auto scan = [&](double offset, std::vector<char>& result) {
     std::vector<std::vector<double>> rows(static_cast<std::size_t>(grid.nj));
-    for (std::size_t w = 0; w < border_walls; ++w) {
-      const Point a = local.vertices[walls[w].first].p, b = local.vertices[walls[w].second].p;
+    for (const auto& [a, b] : border) {
       const double y_low = std::min(a.y(), b.y()), y_high = std::max(a.y(), b.y());
       for (int j = static_cast<int>(std::ceil(y_low - offset)); j + offset < y_high; ++j) {
         if (j + offset < y_low) continue;
@@ -448,15 +259,19 @@ Result<PanelMesh> mesh_whole(const pattern::CutPanel& panel, const GridSettings&
   scan(0, grid.inside);
   scan(0.5, grid.cell_open);
   // A cell through which something runs, or with a vertex on a side, is not regular.
-  all_segments([&](const Point& a, const Point& b) {
-    const int steps = std::max(1, static_cast<int>(std::ceil((b - a).norm() / 0.1)));
-    for (int k = 0; k <= steps; ++k) {
-      const Point p = a + (b - a) * (static_cast<double>(k) / steps);
-      const int i = static_cast<int>(std::floor(p.x())), j = static_cast<int>(std::floor(p.y()));
-      const double x = p.x() - i, y = p.y() - j;
-      if (x > same_place && y > same_place && x < 1 - same_place && y < 1 - same_place && grid.has(i, j)) grid.cell_open[grid.at(i, j)] = 0;
+  for (const auto& [a, b] : obstacles) {
+    const Point &lower = a.y() <= b.y() ? a : b, &upper = a.y() <= b.y() ? b : a;
+    for (int j = static_cast<int>(std::floor(lower.y())); j < upper.y(); ++j) {
+      const double y0 = std::max(lower.y(), j + same_place), y1 = std::min(upper.y(), j + 1 - same_place);
+      if (y0 > y1) continue;
+      const auto x_at = [&](double y) { return upper.y() > lower.y() ? lower.x() + (upper.x() - lower.x()) * (y - lower.y()) / (upper.y() - lower.y()) : lower.x(); };
+      const bool level = upper.y() - lower.y() < same_place;
+      const auto [x0, x1] = level ? std::minmax({a.x(), b.x()}) : std::minmax({x_at(y0), x_at(y1)});
+      for (int i = static_cast<int>(std::floor(x0 + same_place)); i < x1 - same_place; ++i) {
+        if (grid.has(i, j)) grid.cell_open[grid.at(i, j)] = 0;
+      }
     }
-  });
+  }
   for (std::size_t v = 0; v < line_vertices; ++v) {
     const Point p = local.vertices[v].p;
     const int i = static_cast<int>(std::lround(p.x())), j = static_cast<int>(std::lround(p.y()));
@@ -497,7 +312,8 @@ Result<PanelMesh> mesh_whole(const pattern::CutPanel& panel, const GridSettings&
       if (!regular(i + 1, j)) walls.emplace_back(b, c);
       if (!regular(i, j + 1)) walls.emplace_back(c, d);
       if (!regular(i - 1, j)) walls.emplace_back(d, a);
-      if (!settings.alternating || (i + j) % 2 == 0) {
+      cells.push_back({i, j, {a, b, c, d}});
+      if (diagonal == Diagonal::single || (i + j) % 2 == 0) {
         local.triangles.push_back({a, b, c});
         local.triangles.push_back({a, c, d});
       } else {
@@ -520,19 +336,197 @@ Result<PanelMesh> mesh_whole(const pattern::CutPanel& panel, const GridSettings&
       }
       return pairs;
     };
-    auto strip = triangulate_strip(positions, placed(walls), placed(constraints));
-    if (!strip) {
-      Issue issue = strip.issues().front();
-      issue.what += fmt::format(" (cells of {:.3g} x {:.3g} mm)", cells.weft * 1e3, cells.warp * 1e3);
-      return trouble(issue);
-    }
+    const auto strip = triangulate_strip(positions, placed(std::move(walls)), placed(constraints));
+    if (!strip) return strip.issues();
     for (const Triple& t : *strip) local.triangles.push_back({strip_vertices[t[0]], strip_vertices[t[1]], strip_vertices[t[2]]});
+  }
+  return {};
+}
+
+/// Of two diagonals of a cell whose corners were moved the shorter one [m], unless that makes an angle sharper than both
+/// `good` and what is there. Equal ones alternate as they are.
+void take_shorter_diagonals(LocalMesh& local, const std::vector<Cell>& grid, const Cells& cells, double good) {
+  const auto find = [&](int a, int b, int c) {
+    for (int t : local.stars[a]) {
+      const Triple& v = local.triangles[t];
+      for (int k = 0; k < 3; ++k) {
+        if (v[k] == a && v[(k + 1) % 3] == b && v[(k + 2) % 3] == c) return t;
+      }
+    }
+    return -1;
+  };
+  const auto length = [&](int a, int b) { return (cells.back(local.vertices[a].p) - cells.back(local.vertices[b].p)).norm(); };
+  const auto least = [&](const Triple& s, const Triple& t) {
+    const auto of = [&](const Triple& v) { return smallest_angle(local.vertices[v[0]].p, local.vertices[v[1]].p, local.vertices[v[2]].p); };
+    return std::min(of(s), of(t));
+  };
+  for (const Cell& cell : grid) {
+    for (int turn = 0; turn < 2; ++turn) {
+      // Here the diagonal is from a to c.
+      const int a = cell.v[turn], b = cell.v[turn + 1], c = cell.v[turn + 2 > 3 ? turn - 2 : turn + 2], d = cell.v[(turn + 3) % 4];
+      const int first = find(a, b, c), second = find(a, c, d);
+      if (first < 0 || second < 0) continue;
+      if (length(b, d) < length(a, c) * (1 - 1e-9)) {
+        const Triple s{a, b, d}, t{b, c, d};
+        const double now = least(local.triangles[first], local.triangles[second]), then = least(s, t);
+        if (then >= now || then >= good) {
+          replace_triangle(local, first, s);
+          replace_triangle(local, second, t);
+        }
+      }
+      break;
+    }
+  }
+}
+
+Result<PanelMesh> mesh_whole(const pattern::CutPanel& panel, const GridSettings& settings, const std::optional<std::pair<Point, Point>>& fold) {
+  const auto trouble = [&](Issue issue) {
+    issue.place.item = panel.name;
+    return issue;
+  };
+  Cells cells;
+  cells.weft = settings.cell_weft;
+  cells.warp = settings.cell_warp;
+  TOILE_TRY(const LineNetwork net, line_network(panel, sharp_turn));
+  const std::vector<NetworkLine>& lines = net.lines;
+
+  Point low = Point::Constant(std::numeric_limits<double>::infinity()), high = -low;
+  for (std::size_t l = 0; l < net.border_lines; ++l) {
+    for (double s : lines[l].curve.sample(0.1 * cells.reference())) {
+      const Point p = lines[l].curve.point_at(s);
+      low = low.cwiseMin(p);
+      high = high.cwiseMax(p);
+    }
+  }
+  cells.origin = low;
+  if (fold && std::abs(fold->first.x() - fold->second.x()) < on_axis) cells.origin.x() = fold->first.x();
+  if (fold && std::abs(fold->first.y() - fold->second.y()) < on_axis) cells.origin.y() = fold->first.y();
+  {
+    const Point extent = cells(high) - cells(low);
+    if (extent.x() * extent.y() > 5e8) return trouble({"fine_grid", {}, fmt::format("{:.0f} x {:.0f} cells are too many", extent.x(), extent.y()), "choose larger cells"});
+  }
+
+  // Samples of every line. Two lines between the same nodes need a sample each, or they would be one edge.
+  std::vector<std::vector<Sample>> samples(lines.size());
+  {
+    std::vector<std::vector<int>> spans(lines.size());
+    const auto sample = [&](std::size_t l) {
+      std::vector<double> fixed;
+      for (const auto& [s, node] : lines[l].nodes) fixed.push_back(s);
+      samples[l] = sample_line(lines[l].curve, fixed, spans[l], cells, settings.turn);
+    };
+    std::map<std::pair<int, int>, std::vector<std::pair<std::size_t, std::size_t>>> single;
+    for (std::size_t l = 0; l < lines.size(); ++l) {
+      const auto& nodes = lines[l].nodes;
+      for (std::size_t k = 0; k + 1 < nodes.size(); ++k) spans[l].push_back(nodes[k].second == nodes[k + 1].second ? 6 : 1);
+      if (nodes.size() == 2 && lines[l].internal && is_cut(settings, panel, lines[l].name)) spans[l][0] = std::max(spans[l][0], 2);
+      sample(l);
+      std::size_t k = 0;
+      for (std::size_t i = 0; i + 1 < samples[l].size(); ++i) {
+        if (samples[l][i].fixed && samples[l][i + 1].fixed) single[std::minmax(nodes[k].second, nodes[k + 1].second)].emplace_back(l, k);
+        k += samples[l][i + 1].fixed;
+      }
+    }
+    std::set<std::size_t> again;
+    for (const auto& [ends, uses] : single) {
+      if (uses.size() < 2) continue;
+      for (const auto& [l, k] : uses) {
+        spans[l][k] = 2;
+        again.insert(l);
+      }
+    }
+    for (std::size_t l : again) sample(l);
+  }
+
+  // Vertices of the lines.
+  LocalMesh local;
+  std::vector<int> node_vertex(net.nodes.size(), -1);
+  const auto vertex_of = [&](int node) {
+    int& id = node_vertex[static_cast<std::size_t>(node)];
+    if (id < 0) {
+      id = static_cast<int>(local.vertices.size());
+      local.vertices.push_back({cells(net.nodes[static_cast<std::size_t>(node)]), Mobility::fixed, -1, 0});
+    }
+    return id;
+  };
+  std::vector<std::vector<std::pair<int, double>>> fixed_vertices(lines.size());
+  std::vector<std::pair<int, int>> walls, constraints;
+  struct OnLine {
+    std::size_t line;
+    double s0, s1;
+  };
+  std::vector<OnLine> wall_lines, constraint_lines;
+  const auto add_line = [&](std::size_t l) {
+    std::vector<int> ids;
+    std::size_t node = 0;
+    for (const Sample& sample : samples[l]) {
+      if (sample.fixed) {
+        ids.push_back(vertex_of(lines[l].nodes[node++].second));
+        fixed_vertices[l].emplace_back(ids.back(), sample.s);
+      } else {
+        ids.push_back(static_cast<int>(local.vertices.size()));
+        local.vertices.push_back({sample.p, Mobility::slide, static_cast<int>(l), sample.s / cells.reference()});
+      }
+    }
+    for (std::size_t k = 0; k + 1 < ids.size(); ++k) {
+      (lines[l].internal ? constraints : walls).emplace_back(ids[k], ids[k + 1]);
+      (lines[l].internal ? constraint_lines : wall_lines).push_back({l, samples[l][k].s, samples[l][k + 1].s});
+    }
+  };
+  for (std::size_t l = 0; l < lines.size(); ++l) add_line(l);
+  std::vector<GridPoint> points;
+  for (const auto& [name, node] : net.points) points.push_back({name, vertex_of(node)});
+  const auto too_coarse = [&](const Issues& issues) {
+    Issue issue = issues.front();
+    issue.what += fmt::format(" (cells of {:.3g} x {:.3g} mm)", cells.weft * 1e3, cells.warp * 1e3);
+    return trouble(issue);
+  };
+  const auto positions = [&] {
+    std::vector<Point> result;
+    for (const LocalVertex& vertex : local.vertices) result.push_back(vertex.p);
+    return result;
+  };
+
+  std::vector<Cell> grid_cells;
+  if (settings.mesher == Mesher::delaunay) {
+    const auto fresh = refine_delaunay(positions(), walls, constraints);
+    if (!fresh) return too_coarse(fresh.issues());
+    std::vector<std::pair<int, int>> all_walls, all_constraints;
+    std::size_t next = 0;
+    for (std::size_t e = 0; e < walls.size() + constraints.size(); ++e) {
+      const bool wall = e < walls.size();
+      const auto [a, b] = wall ? walls[e] : constraints[e - walls.size()];
+      const OnLine& on = wall ? wall_lines[e] : constraint_lines[e - walls.size()];
+      auto& list = wall ? all_walls : all_constraints;
+      int last = a;
+      for (; next < fresh->on_edges.size() && fresh->on_edges[next].edge == e; ++next) {
+        const double s = on.s0 + (on.s1 - on.s0) * fresh->on_edges[next].t;
+        list.emplace_back(last, static_cast<int>(local.vertices.size()));
+        last = list.back().second;
+        local.vertices.push_back({cells(lines[on.line].curve.point_at(s)), Mobility::slide, static_cast<int>(on.line), s / cells.reference()});
+      }
+      list.emplace_back(last, b);
+    }
+    walls = std::move(all_walls);
+    constraints = std::move(all_constraints);
+    for (const Point& p : fresh->inner) local.vertices.push_back({p, Mobility::free, -1, 0});
+    const auto triangles = triangulate_strip(positions(), walls, constraints);
+    if (!triangles) return too_coarse(triangles.issues());
+    local.triangles = *triangles;
+  } else {
+    std::vector<std::pair<Point, Point>> border, all;
+    for (const auto& [a, b] : walls) border.emplace_back(local.vertices[a].p, local.vertices[b].p);
+    all = border;
+    for (const auto& [a, b] : constraints) all.emplace_back(local.vertices[a].p, local.vertices[b].p);
+    for (const GridPoint& point : points) all.emplace_back(local.vertices[point.vertex].p, local.vertices[point.vertex].p);
+    if (const Issues issues = fill_with_cells(local, border, all, std::move(walls), constraints, settings.diagonal, grid_cells); !issues.empty()) return too_coarse(issues);
   }
   for (auto [a, b] : constraints) local.constraints.emplace(std::min(a, b), std::max(a, b));
   build_stars(local);
   ImproveOptions options;
-  options.curve_point = [&](int curve, double s) { return cells(lines[curve].curve->point_at(s * cells.reference())); };
+  options.curve_point = [&](int curve, double s) { return cells(lines[static_cast<std::size_t>(curve)].curve.point_at(s * cells.reference())); };
   improve(local, options);
+  if (settings.diagonal == Diagonal::shorter) take_shorter_diagonals(local, grid_cells, cells, options.target);
 
   // Runs as they stand now, and the final numbering: border loops in order, then everything else.
   PanelMesh result;
@@ -543,7 +537,8 @@ Result<PanelMesh> mesh_whole(const pattern::CutPanel& panel, const GridSettings&
   std::vector<int> number(local.vertices.size(), -1);
   int next = 0;
   for (std::size_t l = 0; l < lines.size(); ++l) {
-    GridRun run{lines[l].name, lines[l].curve->length(), false, lines[l].internal, {}, lines[l].allowance};
+    GridRun run{lines[l].name, lines[l].curve.length(), false, lines[l].internal, {}, lines[l].allowance};
+    run.reflected = lines[l].reflected;
     std::vector<std::pair<double, int>> order = slid[l];
     for (const auto& [id, s] : fixed_vertices[l]) order.emplace_back(s, id);
     std::sort(order.begin(), order.end());
@@ -582,8 +577,13 @@ Result<PanelMesh> mesh_whole(const pattern::CutPanel& panel, const GridSettings&
 struct Half {
   pattern::CutPanel panel;
   std::map<std::string, std::string> other_edge, other_line, other_point;  ///< name here -> name of its mirror image
-  int axis = 0;        ///< coordinate that the fold line holds constant
-  double at = 0;       ///< its value
+  struct OnFold {
+    std::vector<std::string> edges;  ///< of the half, along the line
+    bool backwards = false;          ///< these edges run against the line
+  };
+  std::map<std::string, OnFold> on_fold;  ///< internal lines along the fold
+  int axis = 0;                           ///< coordinate that the fold line holds constant
+  double at = 0;                          ///< its value
 };
 
 std::optional<Half> half_of(const pattern::CutPanel& panel) {
@@ -600,31 +600,131 @@ std::optional<Half> half_of(const pattern::CutPanel& panel) {
     return at;
   };
   const auto same = [](const Point& a, const Point& b) { return (a - b).norm() < 1e-9; };
+  const auto middle_side = [&](const pattern::Curve& curve) { return side(curve.point_at(0.5 * curve.length())); };
+  // Along the fold with the positive half on the left.
+  Point along = Point::Zero();
+  along[1 - half.axis] = half.axis == 0 ? -1 : 1;
+  const auto place = [&](const Point& at) { return at.dot(along); };
 
+  // Stretches of outline and holes on the positive side; whole holes stay as they are.
   half.panel = panel;
   half.panel.fold.reset();
-  // The edges on the positive side are one stretch of the outline, from one end of the fold to the other.
-  const std::size_t n = panel.outline.size();
-  const auto positive = [&](const pattern::PanelEdge& edge) { return side(edge.curve.point_at(0.5 * edge.curve.length())) > 0; };
-  std::size_t start = n;
-  for (std::size_t k = 0; k < n; ++k) {
-    if (!positive(panel.outline[k]) || positive(panel.outline[(k + n - 1) % n])) continue;
-    if (start < n) return std::nullopt;
-    start = k;
-  }
-  if (start == n) return std::nullopt;
   half.panel.outline.clear();
-  for (std::size_t k = start; positive(panel.outline[k % n]) && k < start + n; ++k) half.panel.outline.push_back(panel.outline[k % n]);
-  if (2 * half.panel.outline.size() != n) return std::nullopt;
-  const Point first = half.panel.outline.front().curve.from(), last = half.panel.outline.back().curve.to();
-  if (std::abs(side(first)) > on_axis || std::abs(side(last)) > on_axis) return std::nullopt;
-  // Where the outline meets the fold at less than 20 degrees the two halves are better meshed as one.
-  const Point along = (first - last).normalized();
-  const double steepest = std::cos(20 * std::numbers::pi / 180);
-  if (half.panel.outline.front().curve.tangent_at(0).dot(-along) > steepest || half.panel.outline.back().curve.tangent_at(half.panel.outline.back().curve.length()).dot(-along) > steepest) return std::nullopt;
+  half.panel.holes.clear();
+  std::vector<std::vector<pattern::PanelEdge>> stretches;
+  std::vector<pattern::PanelEdge> all_edges;
+  const auto take = [&](const std::vector<pattern::PanelEdge>& loop, const std::string& hole) {
+    all_edges.insert(all_edges.end(), loop.begin(), loop.end());
+    const std::size_t n = loop.size();
+    std::vector<char> positive;
+    for (const auto& edge : loop) {
+      const double where = middle_side(edge.curve);
+      if (std::abs(where) <= on_axis) return false;
+      positive.push_back(where > 0);
+      for (const Point& end : {edge.curve.from(), edge.curve.to()}) {
+        if ((where > 0) != (side(end) > 0) && std::abs(side(end)) > on_axis) return false;
+      }
+    }
+    if (std::all_of(positive.begin(), positive.end(), [](char c) { return c == 0; })) return true;
+    if (std::all_of(positive.begin(), positive.end(), [](char c) { return c != 0; })) {
+      if (hole.empty()) return false;
+      half.panel.holes.push_back({hole, loop});
+      return true;
+    }
+    for (std::size_t k = 0; k < n; ++k) {
+      if (!positive[k] || positive[(k + n - 1) % n]) continue;
+      stretches.emplace_back();
+      for (std::size_t i = k; positive[i % n]; ++i) stretches.back().push_back(loop[i % n]);
+    }
+    return true;
+  };
+  if (!take(panel.outline, "")) return std::nullopt;
+  for (const auto& hole : panel.holes) {
+    if (!take(hole.edges, hole.name)) return std::nullopt;
+  }
+
+  // Lines of the positive side, and those along the fold.
+  std::vector<std::pair<const pattern::PanelLine*, std::pair<double, double>>> fold_lines;
+  half.panel.lines.clear();
+  std::size_t negative = 0;
+  for (const auto& line : panel.lines) {
+    const double where = middle_side(line.curve);
+    if (std::abs(where) <= on_axis) {
+      const double from = place(line.curve.from()), to = place(line.curve.to());
+      if (std::abs(std::abs(to - from) - line.curve.length()) > on_axis || std::abs(side(line.curve.from())) > on_axis) return std::nullopt;
+      fold_lines.push_back({&line, std::minmax({from, to})});
+    } else if (where > 0) {
+      half.panel.lines.push_back(line);
+    } else {
+      ++negative;
+    }
+  }
+  if (half.panel.lines.size() != negative) return std::nullopt;
+
+  // The stretches and the fold between them make one loop.
+  if (stretches.empty()) return std::nullopt;
+  std::vector<char> used(stretches.size(), 0);
+  std::size_t current = 0;
+  int parts = 0;
+  std::map<std::string, std::pair<double, double>> fold_parts;
+  while (!used[current]) {
+    used[current] = 1;
+    const auto& stretch = stretches[current];
+    const Point first = stretch.front().curve.from(), last = stretch.back().curve.to();
+    if (std::abs(side(first)) > on_axis || std::abs(side(last)) > on_axis) return std::nullopt;
+    // Where the border meets the fold at less than 20 degrees the two halves are better meshed as one.
+    const double steepest = std::cos(20 * std::numbers::pi / 180);
+    if (stretch.front().curve.tangent_at(0).dot(-along) > steepest || stretch.back().curve.tangent_at(stretch.back().curve.length()).dot(-along) > steepest) return std::nullopt;
+    half.panel.outline.insert(half.panel.outline.end(), stretch.begin(), stretch.end());
+    std::optional<std::size_t> next;
+    for (std::size_t k = 0; k < stretches.size(); ++k) {
+      const double start = place(stretches[k].front().curve.from());
+      if (start > place(last) + on_axis && (!next || start < place(stretches[*next].front().curve.from()))) next = k;
+    }
+    if (!next) return std::nullopt;
+    const Point end = stretches[*next].front().curve.from();
+    std::vector<double> cuts{place(last)};
+    std::vector<double> wanted;
+    for (const auto& [line, range] : fold_lines) {
+      for (double t : {range.first, range.second}) {
+        if (t > place(last) + 1e-6 && t < place(end) - 1e-6) wanted.push_back(t);
+      }
+    }
+    std::sort(wanted.begin(), wanted.end());
+    for (double t : wanted) {
+      if (t > cuts.back() + 1e-6) cuts.push_back(t);
+    }
+    cuts.push_back(place(end));
+    Point here = last;
+    for (std::size_t k = 1; k < cuts.size(); ++k) {
+      Point to = end;
+      if (k + 1 < cuts.size()) to[1 - half.axis] = cuts[k] * along[1 - half.axis];
+      const std::string name = fold_edge + std::to_string(parts++);
+      fold_parts[name] = {cuts[k - 1], cuts[k]};
+      half.panel.outline.push_back({name, "", "", pattern::Curve({pattern::line_segment(here, to)})});
+      here = to;
+    }
+    current = *next;
+  }
+  if (current != 0 || std::find(used.begin(), used.end(), 0) != used.end()) return std::nullopt;
+  for (const auto& [line, range] : fold_lines) {
+    Half::OnFold on;
+    double covered = 0;
+    for (const auto& edge : half.panel.outline) {
+      const auto part = fold_parts.find(edge.name);
+      if (part == fold_parts.end() || part->second.first < range.first - 2e-6 || part->second.second > range.second + 2e-6) continue;
+      on.edges.push_back(edge.name);
+      covered += part->second.second - part->second.first;
+    }
+    if (std::abs(covered - (range.second - range.first)) > 1e-5) return std::nullopt;
+    on.backwards = place(line->curve.to()) < place(line->curve.from());
+    std::sort(on.edges.begin(), on.edges.end(), [&](const auto& a, const auto& b) { return (fold_parts[a] < fold_parts[b]) != on.backwards; });
+    half.on_fold[line->name] = on;
+  }
 
   const auto pair_curves = [&](const auto& here, const auto& all, std::map<std::string, std::string>& names, bool reversed) {
     for (const auto& item : here) {
+      if (item.name.starts_with(fold_edge)) continue;
       for (const auto& other : all) {
         const Point from = reversed ? other.curve.to() : other.curve.from(), to = reversed ? other.curve.from() : other.curve.to();
         const double length = item.curve.length();
@@ -635,28 +735,12 @@ std::optional<Half> half_of(const pattern::CutPanel& panel) {
     }
     return true;
   };
-  if (!pair_curves(half.panel.outline, panel.outline, half.other_edge, true)) return std::nullopt;
-  half.panel.outline.push_back({fold_edge, "", "", pattern::Curve({pattern::line_segment(last, first)})});
-
-  half.panel.holes.clear();
-  std::vector<pattern::PanelEdge> all_hole_edges;
-  for (const auto& hole : panel.holes) all_hole_edges.insert(all_hole_edges.end(), hole.edges.begin(), hole.edges.end());
-  for (const auto& hole : panel.holes) {
-    const bool here = positive(hole.edges.front());
-    for (const auto& edge : hole.edges) {
-      if (positive(edge) != here) return std::nullopt;
-    }
-    if (!here) continue;
-    half.panel.holes.push_back(hole);
-    if (!pair_curves(hole.edges, all_hole_edges, half.other_edge, true)) return std::nullopt;
+  if (!pair_curves(half.panel.outline, all_edges, half.other_edge, true)) return std::nullopt;
+  for (const auto& hole : half.panel.holes) {
+    if (!pair_curves(hole.edges, all_edges, half.other_edge, true)) return std::nullopt;
   }
-  if (2 * half.panel.holes.size() != panel.holes.size()) return std::nullopt;
-
-  half.panel.lines.clear();
-  for (const auto& line : panel.lines) {
-    if (side(line.curve.point_at(0.5 * line.curve.length())) > 0) half.panel.lines.push_back(line);
-  }
-  if (2 * half.panel.lines.size() != panel.lines.size() || !pair_curves(half.panel.lines, panel.lines, half.other_line, false)) return std::nullopt;
+  if (2 * half.other_edge.size() != all_edges.size()) return std::nullopt;
+  if (!pair_curves(half.panel.lines, panel.lines, half.other_line, false)) return std::nullopt;
 
   const auto keep_points = [&](auto& list, const auto& all) {
     list.clear();
@@ -680,11 +764,11 @@ std::optional<Half> half_of(const pattern::CutPanel& panel) {
 }
 
 /// Both halves, joined along the vertices of the fold line.
-PanelMesh unfolded(const PanelMesh& mesh, const Half& half, const pattern::CutPanel& panel, const GridSettings& settings) {
+PanelMesh unfolded(const PanelMesh& mesh, const Half& half, const pattern::CutPanel& panel) {
   const int count = static_cast<int>(mesh.uv.rows());
   std::vector<char> on_fold(static_cast<std::size_t>(count), 0);
   for (const GridRun& run : mesh.runs) {
-    if (run.name != fold_edge) continue;
+    if (!run.name.starts_with(fold_edge)) continue;
     for (const auto& [v, s] : run.vertices) on_fold[static_cast<std::size_t>(v)] = 1;
   }
   std::vector<int> number(2 * static_cast<std::size_t>(count), -1);  // second half: mirror images
@@ -703,6 +787,7 @@ PanelMesh unfolded(const PanelMesh& mesh, const Half& half, const pattern::CutPa
       const bool mirrored = run.name != name, turned = mirrored && !run.internal;
       GridRun copy = run;
       copy.name = name;
+      copy.reflected = run.reflected != mirrored;
       if (turned) {
         std::reverse(copy.vertices.begin(), copy.vertices.end());
         for (auto& [v, s] : copy.vertices) s = run.length - s;
@@ -717,7 +802,23 @@ PanelMesh unfolded(const PanelMesh& mesh, const Half& half, const pattern::CutPa
     for (const auto& edge : hole.edges) add_run(edge.name);
   }
   for (const auto& line : panel.lines) {
-    if (std::find(settings.lines.begin(), settings.lines.end(), line.name) != settings.lines.end()) add_run(line.name);
+    const auto on_fold = half.on_fold.find(line.name);
+    if (on_fold == half.on_fold.end()) {
+      add_run(line.name);
+      continue;
+    }
+    GridRun run{line.name, line.curve.length(), false, true, {}, 0, line.reflected};
+    for (const std::string& part : on_fold->second.edges) {
+      const auto& row = std::find_if(mesh.runs.begin(), mesh.runs.end(), [&](const GridRun& other) { return other.name == part; })->vertices;
+      for (std::size_t k = 0; k < row.size(); ++k) {
+        const int v = row[on_fold->second.backwards ? row.size() - 1 - k : k].first;
+        if (!run.vertices.empty() && k == 0) continue;
+        run.vertices.emplace_back(id(v, false), (mesh.uv.row(v).transpose() - line.curve.from()).norm());
+      }
+    }
+    run.vertices.front().second = 0;
+    run.vertices.back().second = run.length;
+    result.runs.push_back(std::move(run));
   }
   for (bool mirrored : {false, true}) {
     for (int v = 0; v < count; ++v) id(v, mirrored);
@@ -754,19 +855,29 @@ PanelMesh unfolded(const PanelMesh& mesh, const Half& half, const pattern::CutPa
 
 }  // namespace
 
-Result<PanelMesh> mesh_panel(const pattern::CutPanel& panel, const GridSettings& settings) {
+Result<PanelMesh> mesh_panel(const pattern::CutPanel& whole, const GridSettings& settings) {
+  TOILE_TRY(const pattern::CutPanel cut, pattern::cut_out(whole, settings.cut));
+  TOILE_TRY(const pattern::CutPanel panel, clip_lines(cut, sharp_turn));
   // An unfolded panel is meshed as half of it, so that it is symmetric to the last bit. Internal lines that are asked for
   // must be asked for on both halves; a single direction of diagonals cannot be symmetric.
-  const auto half = settings.alternating ? half_of(panel) : std::nullopt;
-  bool symmetric = half.has_value();
-  if (half) {
-    const auto asked = [&](const std::string& name) { return std::find(settings.lines.begin(), settings.lines.end(), name) != settings.lines.end(); };
-    for (const auto& [here, there] : half->other_line) symmetric = symmetric && asked(here) == asked(there);
+  const auto half = settings.diagonal != Diagonal::single || settings.mesher == Mesher::delaunay ? half_of(panel) : std::nullopt;
+  const auto symmetric = [&]() -> std::optional<PanelMesh> {
+    if (!half) return std::nullopt;
+    const auto mesh = mesh_whole(half->panel, settings, panel.fold);
+    if (!mesh) return std::nullopt;
+    return unfolded(*mesh, *half, panel);
+  };
+  std::optional<PanelMesh> mesh = symmetric();
+  if (!mesh) {
+    TOILE_TRY(mesh, mesh_whole(panel, settings, panel.fold));
   }
-  if (!symmetric) return mesh_whole(panel, settings, panel.fold);
-  auto mesh = mesh_whole(half->panel, settings, panel.fold);
-  if (!mesh) return mesh_whole(panel, settings, panel.fold);
-  return unfolded(*mesh, *half, panel, settings);
+  mesh->area = panel.area;
+  std::vector<std::string> slits;
+  for (const auto& line : panel.lines) {
+    if (is_cut(settings, panel, line.name)) slits.push_back(line.name);
+  }
+  if (slits.empty()) return std::move(*mesh);
+  return cut_open(*mesh, slits, panel.name);
 }
 
 PanelMesh mirrored(const PanelMesh& mesh) {
@@ -774,6 +885,10 @@ PanelMesh mirrored(const PanelMesh& mesh) {
   result.uv.col(0) = -result.uv.col(0);
   result.faces.col(1).swap(result.faces.col(2));
   for (GridRun& run : result.runs) {
+    if (run.internal) {
+      run.reflected = !run.reflected;
+      continue;
+    }
     std::reverse(run.vertices.begin(), run.vertices.end());
     for (auto& [vertex, s] : run.vertices) s = run.length - s;
   }

@@ -27,34 +27,57 @@ std::vector<std::uint64_t> sorted_edges(const mesh::Triangles& faces) {
 
 }  // namespace
 
-AngleReport angle_report(const mesh::GarmentMesh& garment) {
+namespace {
+
+/// Reports of the faces, grouped: group 0 to groups - 1.
+template <class GroupOf>
+std::vector<AngleReport> grouped_reports(const mesh::GarmentMesh& garment, std::size_t groups, const GroupOf& group_of) {
   const std::vector<std::uint64_t> keys = sorted_edges(garment.faces);
-  const auto on_border = [&](int a, int b) {
+  std::vector<std::uint64_t> lines;  // edges along internal lines
+  for (std::size_t i = 0; i + 1 < garment.run_vertices.size(); ++i) {
+    const auto &a = garment.run_vertices[i], &b = garment.run_vertices[i + 1];
+    if (a.run == b.run && garment.runs[static_cast<std::size_t>(a.run)].internal) lines.push_back(key(a.vertex, b.vertex));
+  }
+  std::sort(lines.begin(), lines.end());
+  const auto on_line = [&](int a, int b) {
+    if (std::binary_search(lines.begin(), lines.end(), key(a, b))) return true;
     const auto range = std::equal_range(keys.begin(), keys.end(), key(a, b));
     return range.second - range.first == 1;
   };
-  AngleReport report;
-  std::vector<double> all;
-  all.reserve(static_cast<std::size_t>(garment.face_count()));
+  std::vector<AngleReport> reports(groups);
+  std::vector<std::vector<double>> all(groups);
   for (Eigen::Index f = 0; f < garment.face_count(); ++f) {
     const std::array<int, 3> v{garment.faces(f, 0), garment.faces(f, 1), garment.faces(f, 2)};
     const auto corner = angles(garment.uv.row(v[0]), garment.uv.row(v[1]), garment.uv.row(v[2]));
     double least = 180;
     for (int k = 0; k < 3; ++k) {
       if (corner[k] >= least) continue;
-      if (corner[k] < 40 && on_border(v[k], v[(k + 1) % 3]) && on_border(v[k], v[(k + 2) % 3])) continue;
+      if (corner[k] < 40 && on_line(v[k], v[(k + 1) % 3]) && on_line(v[k], v[(k + 2) % 3])) continue;
       least = corner[k];
     }
-    all.push_back(least);
+    AngleReport& report = reports[group_of(f)];
+    all[group_of(f)].push_back(least);
     if (least < report.least) report.least = least, report.least_face = static_cast<int>(f);
     report.below_20 += least < 20;
     ++report.histogram[static_cast<std::size_t>(std::clamp(static_cast<int>(least / 5), 0, 11))];
   }
-  if (all.empty()) return report;
-  std::sort(all.begin(), all.end());
-  report.percent_1 = all[all.size() / 100];
-  report.median = all[all.size() / 2];
-  return report;
+  for (std::size_t g = 0; g < groups; ++g) {
+    if (all[g].empty()) continue;
+    std::sort(all[g].begin(), all[g].end());
+    reports[g].percent_1 = all[g][all[g].size() / 100];
+    reports[g].median = all[g][all[g].size() / 2];
+  }
+  return reports;
+}
+
+}  // namespace
+
+AngleReport angle_report(const mesh::GarmentMesh& garment) {
+  return grouped_reports(garment, 1, [](Eigen::Index) { return std::size_t{0}; }).front();
+}
+
+std::vector<AngleReport> panel_angle_reports(const mesh::GarmentMesh& garment) {
+  return grouped_reports(garment, garment.panels.size(), [&](Eigen::Index f) { return static_cast<std::size_t>(garment.face_panel[f]); });
 }
 
 SurfaceReport surface_report(const mesh::GarmentMesh& garment) {

@@ -6,6 +6,8 @@
 #include <CGAL/Triangulation_vertex_base_with_info_2.h>
 
 #include <algorithm>
+#include <optional>
+#include <tuple>
 
 namespace toile::tailor {
 namespace {
@@ -17,7 +19,27 @@ using Structure = CGAL::Triangulation_data_structure_2<VertexBase, FaceBase>;
 using Cdt = CGAL::Constrained_Delaunay_triangulation_2<Kernel, Structure, CGAL::No_constraint_intersection_tag>;
 
 Issue crossing(const Point& a, const Point& b) {
-  return Issue{"coarse_grid", {}, fmt::format("the border, drawn with edges of cell length, crosses itself near ({:.2f}, {:.2f}) cells", 0.5 * (a + b).x(), 0.5 * (a + b).y()), "choose smaller cells"};
+  return Issue{"coarse_grid", {}, fmt::format("border and lines, drawn with edges of cell length, cross near ({:.2f}, {:.2f}) cells", 0.5 * (a + b).x(), 0.5 * (a + b).y()), "choose smaller cells"};
+}
+
+/// Where two edges cross, of the pairs that do the one farthest to the left.
+std::optional<Point> first_crossing(const std::vector<Point>& points, std::vector<std::pair<int, int>> edges) {
+  const auto at = [&](int v) { return points[static_cast<std::size_t>(v)]; };
+  const auto left = [&](const std::pair<int, int>& e) { return std::min(at(e.first).x(), at(e.second).x()); };
+  const auto right = [&](const std::pair<int, int>& e) { return std::max(at(e.first).x(), at(e.second).x()); };
+  const auto cross = [](const Point& a, const Point& b) { return a.x() * b.y() - a.y() * b.x(); };
+  std::sort(edges.begin(), edges.end(), [&](const auto& a, const auto& b) { return std::tuple(left(a), a) < std::tuple(left(b), b); });
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    for (std::size_t j = i + 1; j < edges.size() && left(edges[j]) <= right(edges[i]); ++j) {
+      const auto [a, b] = edges[i];
+      const auto [c, d] = edges[j];
+      if (a == c || a == d || b == c || b == d) continue;
+      const Point u = at(b) - at(a), w = at(d) - at(c);
+      const double d0 = cross(u, at(c) - at(a)), d1 = cross(u, at(d) - at(a)), d2 = cross(w, at(a) - at(c)), d3 = cross(w, at(b) - at(c));
+      if (d0 * d1 <= 0 && d2 * d3 <= 0 && d2 != d3) return at(a) + u * (d2 / (d2 - d3));
+    }
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -35,6 +57,11 @@ Result<std::vector<Triple>> triangulate_strip(const std::vector<Point>& points, 
     if ((j - i) % 2 == 1) single.push_back(walls[i]);
     i = j;
   }
+  // A side of a regular cell may lie on a constraint.
+  std::vector<std::pair<int, int>> all = single;
+  for (const auto& [a, b] : constraints) all.emplace_back(std::min(a, b), std::max(a, b));
+  std::sort(all.begin(), all.end());
+  all.erase(std::unique(all.begin(), all.end()), all.end());
   Cdt cdt;
   std::vector<Cdt::Vertex_handle> handles(points.size());
   try {
@@ -49,17 +76,14 @@ Result<std::vector<Triple>> triangulate_strip(const std::vector<Point>& points, 
         if (handles[i]->info() != static_cast<int>(i)) return crossing(points[i], points[i]);
       }
     }
-    const auto add = [&](const std::pair<int, int>& edge) { cdt.insert_constraint(handles[edge.first], handles[edge.second]); };
-    std::for_each(single.begin(), single.end(), add);
-    std::for_each(constraints.begin(), constraints.end(), add);
+    for (const auto& [a, b] : all) cdt.insert_constraint(handles[a], handles[b]);
   } catch (const Cdt::Intersection_of_constraints_exception&) {
-    // CGAL does not say where; the first pair that meets a point or another pair is found below.
-    return Issue{"coarse_grid", {}, "the border, drawn with edges of cell length, crosses itself", "choose smaller cells"};
+    // CGAL does not say where.
+    if (const auto where = first_crossing(points, all)) return crossing(*where, *where);
+    return Issue{"coarse_grid", {}, "border and lines, drawn with edges of cell length, cross", "choose smaller cells"};
   }
-  for (const auto& list : {single, constraints}) {
-    for (const auto& [a, b] : list) {
-      if (!cdt.is_edge(handles[a], handles[b])) return crossing(points[a], points[b]);
-    }
+  for (const auto& [a, b] : all) {
+    if (!cdt.is_edge(handles[a], handles[b])) return crossing(points[a], points[b]);
   }
   // Flood from outside; crossing a wall changes sides.
   for (auto face : cdt.all_face_handles()) face->info() = -1;

@@ -33,7 +33,7 @@ struct Hole {
 
 enum class LineKind { fold, dart, placement, stitch, cut, other };
 
-/// An open line on the cloth.
+/// A line on the cloth, open or closed.
 struct InternalLine {
   std::string name;  ///< unique in its piece (edges included)
   LineKind kind = LineKind::other;
@@ -136,6 +136,9 @@ struct PanelLine {
   std::string name;
   LineKind kind = LineKind::other;
   Curve curve;
+  bool reflected = false;  ///< of a mirrored half or copy: what was on the left of the drawn line is on the right here
+  /// Runs back into its own start.
+  bool closed() const { return (curve.to() - curve.from()).norm() <= 1e-4; }
 };
 
 struct PanelPoint {
@@ -192,6 +195,13 @@ std::string panel_name(const Piece& piece, int copy);
 /// an outline drawn clockwise. v runs from `grain.from` to `grain.to`, or up the drawing where the fold is the grain.
 /// error  all issues of check()
 Result<std::vector<CutPanel>> cut_panels(const Pattern& pattern);
+
+/// The panel with a hole wherever the named internal lines close: a closed line, or several whose ends meet (within
+/// on_edge_tolerance). What lies inside falls out: marks, too. The edges of a hole are called like their lines; a closed
+/// line that turns by more than 60 degrees at n > 1 corners gives n edges `line_1`, ..., `line_n`, in its direction from
+/// its first corner on. Lines that do not close stay lines. Names that are not there are ignored.
+/// error  Issue "duplicate_name" where an edge of that name exists
+Result<CutPanel> cut_out(const CutPanel& panel, const std::vector<std::string>& lines);
 
 /// The edge of that name in outline or holes; null if there is none.
 const PanelEdge* find_edge(const CutPanel& panel, std::string_view name);

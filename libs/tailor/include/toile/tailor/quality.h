@@ -9,8 +9,8 @@
 
 namespace toile::tailor {
 
-/// Distribution of the smallest angle of each triangle in panel coordinates [deg]. Angles between two border edges are
-/// the outline's own and do not count.
+/// Distribution of the smallest angle of each triangle in panel coordinates [deg]. Angles between two edges of border or
+/// internal lines are the pattern's own and do not count.
 struct AngleReport {
   double least = 180;
   double percent_1 = 180;            ///< one triangle in a hundred is below
@@ -20,6 +20,8 @@ struct AngleReport {
   int least_face = -1;
 };
 AngleReport angle_report(const mesh::GarmentMesh& garment);
+/// The same for each panel.
+std::vector<AngleReport> panel_angle_reports(const mesh::GarmentMesh& garment);
 
 /// The garment as one surface of particles, i.e. after welding.
 struct SurfaceReport {
