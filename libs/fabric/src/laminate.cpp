@@ -3,11 +3,141 @@
 #include "toile/fabric/constitutive.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <vector>
+#include <numbers>
 
 namespace toile::fabric {
 namespace {
+
+enum Direction : std::size_t { warp = 0, weft = 1 };
+
+/// Where the slope of a turned sheet's shear curve is taken: KES-F reads G up to there.
+constexpr double shear_angle_read = 2.5 * std::numbers::pi / 180;
+
+/// One sheet seen along the stack's warp and weft. A sheet that is turned by an angle a takes a strain e along the stack's
+/// warp as e cos^2 a along its own warp, e sin^2 a along its weft and a shear of 2 e sin a cos a.
+struct Part {
+  std::array<double, 2> share{1, 0};  ///< cos^2, sin^2
+  double cross = 0;                   ///< sin cos
+  double cosine_of_double = 1;
+  const Card* card = nullptr;
+  std::array<TensileCurve, 2> tension;  ///< of its own yarns
+  std::array<MomentCurve, 2> moment;
+  ShearCurve shear_force;
+  std::array<double, 2> resilience, bending, bending_hysteresis, tensile_friction;
+  double shear = 0, shear_hysteresis = 0, shear_hysteresis_5 = 0, twist = 0, thickness = 0;
+
+  double along(Direction stack, std::size_t own) const { return share[stack == own ? 0 : 1]; }
+
+  struct Pull {
+    double work = 0, returned = 0, force = 0;
+  };
+  Pull pull(Direction direction, double strain) const {
+    Pull result;
+    for (std::size_t own : {warp, weft}) {
+      const double part = along(direction, own);
+      const CurvePoint point = tension[own].at(strain * part);
+      result.work += point.energy;
+      result.returned += point.energy * resilience[own];
+      result.force += part * point.force;
+    }
+    const double angle = 2 * strain * cross;
+    result.work += 0.5 * shear * angle * angle;
+    result.returned += 0.5 * shear * angle * angle;
+    result.force += 2 * cross * shear * angle;
+    return result;
+  }
+  /// Membrane stiffness at no strain.
+  double stiffness(Direction direction) const {
+    double sum = 4 * cross * cross * shear;
+    for (std::size_t own : {warp, weft}) sum += along(direction, own) * along(direction, own) * tension[own].slope_zero;
+    return sum;
+  }
+  /// What the yarns give to the shear force of a turned sheet, the mean of shearing to either side.
+  double shear_by_yarns(double angle) const {
+    if (cross == 0) return 0;
+    double sum = 0;
+    for (std::size_t own : {warp, weft}) sum += 0.5 * cross * (tension[own].at(angle * cross).force - tension[own].at(-angle * cross).force);
+    return sum;
+  }
+  double shear_at(double angle) const {
+    const double own = angle * cosine_of_double;
+    return shear_by_yarns(angle) + cosine_of_double * std::copysign(shear_force.force_at_angle(std::abs(own)), own);
+  }
+  double shear_stiffness() const { return shear * cosine_of_double * cosine_of_double + shear_by_yarns(shear_angle_read) / shear_angle_read; }
+  double moment_at(Direction direction, double curvature) const {
+    double sum = 4 * cross * cross * twist * curvature;
+    for (std::size_t own : {warp, weft}) {
+      const double part = along(direction, own);
+      if (part > 0) sum += part * moment[own].at(part * curvature).force;
+    }
+    return sum;
+  }
+  double bending_stiffness(Direction direction) const {
+    double sum = 4 * cross * cross * twist;
+    for (std::size_t own : {warp, weft}) sum += along(direction, own) * along(direction, own) * bending[own];
+    return sum;
+  }
+  double twist_stiffness() const { return twist * cosine_of_double * cosine_of_double + cross * cross * (bending[warp] + bending[weft]); }
+  double of_yarns(Direction direction, const std::array<double, 2>& value) const { return along(direction, warp) * value[warp] + along(direction, weft) * value[weft]; }
+};
+
+Part part_of(const Sheet& sheet) {
+  Part part;
+  double cosine = std::cos(sheet.angle), sine = std::sin(sheet.angle);
+  // Quarter turns are exact.
+  if (std::abs(sine) < 1e-12) sine = 0;
+  if (std::abs(cosine) < 1e-12) cosine = 0;
+  part.share = {cosine * cosine, sine * sine};
+  if (sine == 0 || cosine == 0) part.share = {std::round(part.share[0]), std::round(part.share[1])};
+  part.cross = sine * cosine;
+  part.cosine_of_double = part.share[0] - part.share[1];
+  const Card& card = sheet.card;
+  for (std::size_t own : {warp, weft}) {
+    const YarnDirection& yarn = own == warp ? card.warp : card.weft;
+    part.tension[own] = tensile_curve(card, yarn);
+    part.moment[own] = moment_curve(yarn);
+    part.resilience[own] = yarn.resilience;
+    part.bending[own] = yarn.bending;
+    part.bending_hysteresis[own] = yarn.bending_hysteresis;
+    // A constant force whose loop to EMT and back has the area that is lost: (1 - RT) WT = 2 f EMT.
+    part.tensile_friction[own] = (1 - yarn.resilience) * yarn.linearity * card.tensile_force_max / 4;
+  }
+  part.card = &sheet.card;
+  part.shear = card.shear;
+  part.shear_force = shear_curve(card);
+  part.shear_hysteresis = card.shear_hysteresis * std::abs(part.cosine_of_double);
+  part.shear_hysteresis_5 = card.shear_hysteresis_5 * std::abs(part.cosine_of_double);
+  part.twist = card.twist_ratio * std::sqrt(card.warp.bending * card.weft.bending);
+  part.thickness = card.thickness;
+  return part;
+}
+
+/// Sum over a plate of own + membrane (z - z_n)^2, and of friction |z - z_n|; z_n is the neutral axis of the membrane stiffness.
+struct PlateSum {
+  double stiffness = 0, friction = 0;
+};
+template <class Membrane, class Own, class Friction>
+PlateSum plate_sum(std::span<const Part> plate, Membrane membrane, Own own, Friction friction) {
+  PlateSum sum;
+  for (const Part& part : plate) sum.stiffness += own(part);
+  if (plate.size() == 1) return sum;
+  std::vector<double> z;
+  double top = 0, weight = 0, moment = 0;
+  for (const Part& part : plate) {
+    z.push_back(top + part.thickness / 2);
+    top += part.thickness;
+    weight += membrane(part);
+    moment += membrane(part) * z.back();
+  }
+  const double neutral = moment / weight;
+  for (std::size_t k = 0; k < plate.size(); ++k) {
+    sum.stiffness += membrane(plate[k]) * (z[k] - neutral) * (z[k] - neutral);
+    sum.friction += friction(plate[k]) * std::abs(z[k] - neutral);
+  }
+  return sum;
+}
 
 std::vector<double> sorted_union(std::vector<double> points, double last) {
   std::erase_if(points, [&](double p) { return p > last * (1 + 1e-9); });
@@ -22,47 +152,53 @@ std::vector<double> sorted_union(std::vector<double> points, double last) {
 }
 
 /// Sum of the sheets' tensile curves at all their points, up to a strain.
-TensionTable summed_tension(std::span<const Card> sheets, YarnDirection Card::*direction, double strain_max) {
+TensionTable summed_tension(std::span<const Part> parts, Direction direction, double strain_max) {
   std::vector<double> points;
-  for (const Card& sheet : sheets) {
-    const YarnDirection& yarn = sheet.*direction;
-    if (yarn.tension) {
-      points.insert(points.end(), yarn.tension->strain.begin(), yarn.tension->strain.end());
-    } else {
-      for (int k = 1; k <= 16; ++k) points.push_back(yarn.strain_max * k / 16);
+  for (const Part& part : parts) {
+    for (const YarnDirection* yarn : {&part.card->warp, &part.card->weft}) {
+      const double share = part.along(direction, yarn == &part.card->warp ? warp : weft);
+      if (share == 0) continue;
+      if (yarn->tension) {
+        for (double strain : yarn->tension->strain) points.push_back(strain / share);
+      } else {
+        for (int k = 1; k <= 16; ++k) points.push_back(yarn->strain_max / share * k / 16);
+      }
     }
   }
   points.push_back(strain_max);
   TensionTable table;
   table.strain = sorted_union(std::move(points), strain_max);
   table.force.assign(table.strain.size(), 0);
-  for (const Card& sheet : sheets) {
-    const TensileCurve curve = tensile_curve(sheet, sheet.*direction);
-    for (std::size_t i = 0; i < table.strain.size(); ++i) table.force[i] += curve.at(table.strain[i]).force;
+  for (const Part& part : parts) {
+    for (std::size_t i = 0; i < table.strain.size(); ++i) table.force[i] += part.pull(direction, table.strain[i]).force;
   }
   return table;
 }
 
-MomentTable summed_moment(std::span<const Card> sheets, YarnDirection Card::*direction) {
+/// Sum of the sheets' moments at all their points, and the stretching of glued sheets, proportional to the curvature.
+MomentTable summed_moment(std::span<const Part> parts, Direction direction, double stretching) {
   std::vector<double> points;
-  for (const Card& sheet : sheets) {
-    if (const auto& moment = (sheet.*direction).moment) points.insert(points.end(), moment->curvature.begin(), moment->curvature.end());
+  for (const Part& part : parts) {
+    for (const YarnDirection* yarn : {&part.card->warp, &part.card->weft}) {
+      const double share = part.along(direction, yarn == &part.card->warp ? warp : weft);
+      if (share == 0 || !yarn->moment) continue;
+      for (double curvature : yarn->moment->curvature) points.push_back(curvature / share);
+    }
   }
   MomentTable table;
   table.curvature = sorted_union(points, *std::max_element(points.begin(), points.end()));
-  table.moment.assign(table.curvature.size(), 0);
-  for (const Card& sheet : sheets) {
-    const MomentCurve curve = moment_curve(sheet.*direction);
-    for (std::size_t i = 0; i < table.curvature.size(); ++i) table.moment[i] += curve.at(table.curvature[i]).force;
+  for (double curvature : table.curvature) {
+    table.moment.push_back(stretching * curvature);
+    for (const Part& part : parts) table.moment.back() += part.moment_at(direction, curvature);
   }
   return table;
 }
 
-ShearTable summed_shear(std::span<const Card> sheets) {
+ShearTable summed_shear(std::span<const Part> parts) {
   std::vector<double> points;
-  for (const Card& sheet : sheets) {
-    if (sheet.shear_table) points.insert(points.end(), sheet.shear_table->angle.begin(), sheet.shear_table->angle.end());
-    const Locking locking = used_locking(sheet);
+  for (const Part& part : parts) {
+    if (part.card->shear_table) points.insert(points.end(), part.card->shear_table->angle.begin(), part.card->shear_table->angle.end());
+    const Locking locking = used_locking(*part.card);
     for (int k = 0; k <= 4; ++k) points.push_back(locking.angle + (locking.angle_end - locking.angle) * k / 4);
   }
   ShearTable table;
@@ -70,85 +206,144 @@ ShearTable summed_shear(std::span<const Card> sheets) {
   points.push_back(1.2 * last);  // the slope beyond all of them
   table.angle = sorted_union(points, 1.2 * last);
   table.force.assign(table.angle.size(), 0);
-  for (const Card& sheet : sheets) {
-    const ShearCurve curve = shear_curve(sheet);
-    for (std::size_t i = 0; i < table.angle.size(); ++i) table.force[i] += curve.force_at_angle(table.angle[i]);
+  for (const Part& part : parts) {
+    for (std::size_t i = 0; i < table.angle.size(); ++i) table.force[i] += part.shear_at(table.angle[i]);
   }
   return table;
 }
 
-YarnDirection combined(std::span<const Card> sheets, YarnDirection Card::*direction) {
-  const double force_max = sheets.front().tensile_force_max;
-  std::vector<TensileCurve> curves;
-  for (const Card& sheet : sheets) curves.push_back(tensile_curve(sheet, sheet.*direction));
-  double strain_max = 0;
-  for (const TensileCurve& curve : curves) strain_max = std::max(strain_max, strain_at(curve, force_max));
-  double low = 0, high = strain_max;
+YarnDirection combined(std::span<const Part> parts, std::span<const std::span<const Part>> plates, Direction direction, double force_max) {
+  const auto pull = [&](double strain) {
+    Part::Pull sum;
+    for (const Part& part : parts) {
+      const Part::Pull own = part.pull(direction, strain);
+      sum.work += own.work;
+      sum.returned += own.returned;
+      sum.force += own.force;
+    }
+    return sum;
+  };
+  double low = 0, high = 0.01;
+  while (pull(high).force < force_max && high < 100) high *= 2;
   for (int step = 0; step < 200; ++step) {
     const double middle = 0.5 * (low + high);
-    double force = 0;
-    for (const TensileCurve& curve : curves) force += curve.at(middle).force;
-    (force < force_max ? low : high) = middle;
+    (pull(middle).force < force_max ? low : high) = middle;
   }
   YarnDirection result;
   result.strain_max = 0.5 * (low + high);
-  double work = 0, returned = 0;
+  const Part::Pull all = pull(result.strain_max);
+  result.linearity = std::clamp(2 * all.work / (force_max * result.strain_max), 0.3, 1.0);
+  result.resilience = all.returned / all.work;
   result.bending = result.bending_hysteresis = 0;
-  bool tension = false, moment = false;
-  for (std::size_t i = 0; i < sheets.size(); ++i) {
-    const YarnDirection& yarn = sheets[i].*direction;
-    const double own = curves[i].at(result.strain_max).energy;
-    work += own;
-    returned += own * yarn.resilience;
-    result.bending += yarn.bending;
-    result.bending_hysteresis += yarn.bending_hysteresis;
-    tension |= yarn.tension.has_value();
-    moment |= yarn.moment.has_value();
+  for (const Part& part : parts) result.bending_hysteresis += part.of_yarns(direction, part.bending_hysteresis);
+  for (const auto& plate : plates) {
+    const PlateSum sum = plate_sum(plate, [&](const Part& p) { return p.stiffness(direction); }, [&](const Part& p) { return p.bending_stiffness(direction); },
+                                   [&](const Part& p) { return p.of_yarns(direction, p.tensile_friction); });
+    result.bending += sum.stiffness;
+    result.bending_hysteresis += 2 * sum.friction;
   }
-  result.linearity = std::clamp(2 * work / (force_max * result.strain_max), 0.3, 1.0);
-  result.resilience = returned / work;
-  if (tension) result.tension = summed_tension(sheets, direction, 1.5 * result.strain_max);
-  if (moment) result.moment = summed_moment(sheets, direction);
+  const auto sees = [&](const Part& part, std::size_t own) { return part.along(direction, own) > 0; };
+  bool tension = false, moment = false;
+  double own_bending = 0;
+  for (const Part& part : parts) {
+    tension |= (part.card->warp.tension && sees(part, warp)) || (part.card->weft.tension && sees(part, weft));
+    moment |= (part.card->warp.moment && sees(part, warp)) || (part.card->weft.moment && sees(part, weft));
+    own_bending += part.bending_stiffness(direction);
+  }
+  if (tension) result.tension = summed_tension(parts, direction, 1.5 * result.strain_max);
+  if (moment) result.moment = summed_moment(parts, direction, result.bending - own_bending);
   return result;
 }
 
 }  // namespace
 
-Result<Card> bonded(std::span<const Card> sheets, const std::string& name) {
+SlidingFriction sliding_friction(const Card& a, const Card& b, double pressure, double spacing) {
+  const double stress = 0.5 * (a.friction + b.friction) * pressure;
+  SlidingFriction result;
+  result.shear = stress * spacing / 2;
+  result.bending = result.shear * 0.5 * (a.thickness + b.thickness);
+  return result;
+}
+
+Result<Card> stacked(std::span<const Sheet> sheets, std::span<const Bond> bonds, const std::string& name) {
   if (sheets.empty()) return Issue{"no_sheets", {.item = name}, "a laminate needs at least one sheet", "name a fabric"};
+  TOILE_CHECK(bonds.size() + 1 == sheets.size(), "{} sheets and {} bonds", sheets.size(), bonds.size());
   Issues issues;
-  for (const Card& sheet : sheets) {
-    for (Issue issue : validate(sheet)) {
+  for (const Sheet& sheet : sheets) {
+    for (Issue issue : validate(sheet.card)) {
       issue.code = "bad_fabric";
-      issue.place.item = "fabric " + sheet.name + ": " + issue.place.item;
+      issue.place.item = "fabric " + sheet.card.name + ": " + issue.place.item;
       issues.push_back(issue);
     }
   }
   if (!issues.empty()) return issues;
-  Card result = sheets.front();
+  Card result = sheets.front().card;
   result.name = name;
-  if (sheets.size() == 1) return result;
-  result.description = "bonded: ";
-  result.origin = "computed from its sheets as parallel networks";
-  result.areal_density = result.thickness = result.shear = result.shear_hysteresis = result.shear_hysteresis_5 = 0;
-  double twist = 0;
-  for (const Card& sheet : sheets) {
-    result.description += (&sheet == &sheets.front() ? "" : " + ") + sheet.name;
-    result.areal_density += sheet.areal_density;
-    result.thickness += sheet.thickness;
-    result.shear += sheet.shear;
-    result.shear_hysteresis += sheet.shear_hysteresis;
-    result.shear_hysteresis_5 += sheet.shear_hysteresis_5;
-    twist += sheet.twist_ratio * std::sqrt(sheet.warp.bending * sheet.weft.bending);
+  if (sheets.size() == 1 && sheets.front().angle == 0) return result;
+
+  std::vector<Part> parts;
+  for (const Sheet& sheet : sheets) parts.push_back(part_of(sheet));
+  std::vector<std::span<const Part>> plates;
+  std::size_t first = 0;
+  bool glued = false, slides = false;
+  for (std::size_t k = 1; k <= parts.size(); ++k) {
+    if (k < parts.size() && bonds[k - 1].joint == Joint::laminate) {
+      glued = true;
+      continue;
+    }
+    if (k < parts.size() && bonds[k - 1].joint == Joint::sliding) slides = true;
+    plates.emplace_back(parts.data() + first, k - first);
+    first = k;
   }
-  result.warp = combined(sheets, &Card::warp);
-  result.weft = combined(sheets, &Card::weft);
+
+  result.description = "bonded: ";
+  result.origin = fmt::format("computed from its sheets as {}", !glued && !slides ? "parallel networks" : glued && slides ? "glued and sliding layers" : glued ? "a laminate" : "sliding layers");
+  result.areal_density = result.thickness = result.shear = result.shear_hysteresis = result.shear_hysteresis_5 = 0;
+  for (const Sheet& sheet : sheets) {
+    result.description += (&sheet == &sheets.front() ? "" : " + ") + sheet.card.name;
+    result.areal_density += sheet.card.areal_density;
+    result.thickness += sheet.card.thickness;
+  }
+  for (const Part& part : parts) {
+    result.shear += part.shear_stiffness();
+    result.shear_hysteresis += part.shear_hysteresis;
+    result.shear_hysteresis_5 += part.shear_hysteresis_5;
+  }
+  double twist = 0;
+  for (const auto& plate : plates) {
+    twist += plate_sum(plate, [](const Part& p) { return p.shear_stiffness(); }, [](const Part& p) { return p.twist_stiffness(); }, [](const Part&) { return 0.0; }).stiffness;
+  }
+  result.warp = combined(parts, plates, warp, result.tensile_force_max);
+  result.weft = combined(parts, plates, weft, result.tensile_force_max);
   result.licence.reset();
   result.shear_table.reset();
   result.locking.reset();
-  if (std::any_of(sheets.begin(), sheets.end(), [](const Card& sheet) { return sheet.shear_table || sheet.locking; })) result.shear_table = summed_shear(sheets);
+  if (std::any_of(sheets.begin(), sheets.end(), [](const Sheet& sheet) { return sheet.card.shear_table || sheet.card.locking; })) result.shear_table = summed_shear(parts);
+  for (const Bond& bond : bonds) {
+    if (bond.joint != Joint::sliding) continue;
+    result.warp.bending_hysteresis += bond.bending_friction;
+    result.weft.bending_hysteresis += bond.bending_friction;
+    result.shear_hysteresis += bond.shear_friction;
+    result.shear_hysteresis_5 += bond.shear_friction;
+  }
   result.twist_ratio = twist / std::sqrt(result.warp.bending * result.weft.bending);
+  // What a card may hold: a stack of many sheets can leave its ranges.
+  issues = validate(result);
+  for (Issue& issue : issues) {
+    issue.code = "bad_fabric";
+    issue.place.item = "laminate " + name + ": " + issue.place.item;
+    issue.remedy = "stack fewer sheets, or check their cards";
+  }
+  if (!issues.empty()) return issues;
   return result;
+}
+
+double bending_along(const Card& card, double angle) { return part_of({card, angle}).bending_stiffness(warp); }
+
+Result<Card> bonded(std::span<const Card> sheets, const std::string& name) {
+  std::vector<Sheet> stack;
+  for (const Card& card : sheets) stack.push_back({card, 0});
+  return stacked(stack, std::vector<Bond>(sheets.empty() ? 0 : sheets.size() - 1), name);
 }
 
 }  // namespace toile::fabric
