@@ -129,8 +129,8 @@ class Reader {
         for (std::size_t i = 0; i < node.size(); ++i) read_number(node[i], field, type, static_cast<double*>(value) + i, fmt::format("{}[{}]", path, i));
         return;
       case Kind::list:
-        if (node.IsScalar() && type.element->kind == Kind::text) {
-          // One word stands for a list of one: `in: {fabrics: card}`.
+        if ((node.IsScalar() && type.element->kind == Kind::text) || (node.IsMap() && type.element->kind == Kind::record)) {
+          // One word or one mapping stands for a list of one: `in: {fabrics: card}`, `a: {point: front.top}`.
           type.clear(value);
           return read_value(node, field, *type.element, type.append(value), path);
         }
@@ -341,7 +341,12 @@ json schema_of(const Field& field, const ValueType& type) {
     case Kind::choice: return {{"enum", type.choices}};
     case Kind::fixed_numbers:
       return {{"type", "array"}, {"items", schema_of(field, ValueType{})}, {"minItems", type.fixed_size}, {"maxItems", type.fixed_size}};
-    case Kind::list: return {{"type", "array"}, {"items", schema_of(field, *type.element)}};
+    case Kind::list: {
+      const json element = schema_of(field, *type.element);
+      const json list{{"type", "array"}, {"items", element}};
+      if (type.element->kind != Kind::text && type.element->kind != Kind::record) return list;
+      return {{"anyOf", json::array({list, element})}};
+    }
     case Kind::map: return {{"type", "object"}, {"additionalProperties", schema_of(field, *type.element)}};
     case Kind::optional: return schema_of(field, *type.element);
     case Kind::record: return schema_record(*type.record);
