@@ -37,16 +37,10 @@ struct MeasureStage {
   }
 
   static Result<stage::Output> run(const Params& params, stage::Run& run) {
-    auto garment = run.garment("garment");
-    if (!garment) return garment.issues();
-    std::optional<mesh::SupportMesh> support;
-    if (run.has("support")) {
-      auto read = run.support("support");
-      if (!read) return read.issues();
-      support = std::move(*read);
-    }
+    TOILE_TRY(const stage::Fitting fitting, run.fitting("garment"));
+    const mesh::GarmentMesh& garment = fitting.garment;
     const inspect::MeasureParams request{params.girths, params.lengths, params.checks};
-    const auto figures = inspect::measure(request, *garment, support ? &*support : nullptr);
+    const auto figures = inspect::measure(request, garment, fitting.support_or_null());
     if (!figures) return figures.issues();
 
     inspect::Json json = inspect::to_json(*figures);
@@ -55,14 +49,14 @@ struct MeasureStage {
       if (run.has(port)) inputs.set(port, content_hash(*run.bytes(port)));
     }
     inspect::Json route = inspect::Json::array();
-    for (const mesh::RouteEntry& entry : garment->route) route.push(inspect::Json::object().set("stage", entry.stage).set("version", entry.version));
+    for (const mesh::RouteEntry& entry : garment.route) route.push(inspect::Json::object().set("stage", entry.stage).set("version", entry.version));
     route.push(inspect::Json::object().set("stage", description().name).set("version", description().version).set("inputs", std::move(inputs)));
     json.set("route", std::move(route));
 
-    stage::Output output{json.dump(), inspect::failed_checks(params.checks, *figures, *garment), {}};
+    stage::Output output{json.dump(), inspect::failed_checks(params.checks, *figures, garment), {}};
     if (!params.panels_csv.empty()) output.side_files.push_back({params.panels_csv, inspect::panels_csv(*figures)});
     if (!params.seams_csv.empty()) output.side_files.push_back({params.seams_csv, inspect::seams_csv(*figures)});
-    if (!params.map.empty()) output.side_files.push_back({params.map, io::format_garment(inspect::with_maps(*garment, *figures), io::Encoding::binary)});
+    if (!params.map.empty()) output.side_files.push_back({params.map, io::format_garment(inspect::with_maps(garment, *figures), io::Encoding::binary)});
 
     run.report("faces", figures->faces);
     if (figures->converged) run.report("converged", *figures->converged);

@@ -84,6 +84,20 @@ const std::string& Run::path(const std::string& port) const {
   return paths(port).front();
 }
 
+Result<Fitting> Run::fitting(const std::string& garment_port) const {
+  Result<mesh::GarmentMesh> garment_read = garment(garment_port);
+  Issues issues = garment_read.issues();
+  Fitting fitting;
+  if (has("support")) {
+    Result<mesh::SupportMesh> support_read = support("support");
+    append(issues, support_read.issues());
+    if (support_read) fitting.support = std::move(*support_read);
+  }
+  if (!issues.empty()) return issues;
+  fitting.garment = std::move(*garment_read);
+  return fitting;
+}
+
 Result<std::string> Run::bytes(const std::string& port, std::size_t index) const {
   TOILE_CHECK(index < paths(port).size(), "input '{}' has {} files", port, paths(port).size());
   return contents_.at(paths(port)[index]);

@@ -18,6 +18,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -58,6 +59,13 @@ struct Output {
   std::vector<SideFile> side_files;  ///< written (atomically) before the main output
 };
 
+/// A garment and, where it is given, the support that it is looked at on.
+struct Fitting {
+  mesh::GarmentMesh garment;
+  std::optional<mesh::SupportMesh> support;
+  const mesh::SupportMesh* support_or_null() const { return support ? &*support : nullptr; }
+};
+
 /// The command line as a stage sees it: its inputs, and ways to speak.
 class Run {
  public:
@@ -67,6 +75,8 @@ class Run {
   const std::vector<std::string>& paths(const std::string& port) const;
   Result<mesh::GarmentMesh> garment(const std::string& port) const;
   Result<mesh::SupportMesh> support(const std::string& port) const;
+  /// The garment of a port and the support of the port "support", which may be missing. The issues of both.
+  Result<Fitting> fitting(const std::string& garment_port) const;
   /// The bytes of an input (one of several: by index).
   Result<std::string> bytes(const std::string& port, std::size_t index = 0) const;
 
