@@ -1,4 +1,5 @@
 #include "toile/inspect/artefact.h"
+#include "toile/inspect/bill.h"
 #include "toile/inspect/info.h"
 #include "toile/stage/stage.h"
 
@@ -10,8 +11,10 @@ enum class Search { automatic, yes, no };
 
 struct Params {
   Search search = Search::automatic;
+  bool bill = false;
   static void describe(auto& f) {
     f(&Params::search, {.key = "search", .doc = "whether intersections are searched for; auto: up to 300000 faces"});
+    f(&Params::bill, {.key = "bill", .doc = "only the bill of materials of a garment, as JSON"});
   }
 };
 
@@ -29,10 +32,11 @@ struct InfoStage {
 
   static stage::Description description() {
     return {.name = "toile-info",
-            .version = 1,
+            .version = 2,
             .summary = "Tells what is in a garment or a support file.",
             .example = "toile-info draped.ply --support form.ply",
-            .details = "Text for people, or JSON with --json. docs/measures.md defines the figures.",
+            .details = "Text for people, or JSON with --json, which holds the bill of materials too. docs/measures.md defines the figures, "
+                       "docs/tailoring.md the bill.",
             .inputs = {{"file", "garment or support", stage::FileKind::any}, {"support", "body or dress form to compare a garment with", stage::FileKind::support, false}},
             .output = stage::FileKind::any,
             .output_optional = true};
@@ -52,18 +56,13 @@ struct InfoStage {
       default:
         return Issue{"unknown_kind", {.file = name}, "this is neither a garment nor a support", "give a file that one of the stages wrote; toile-body brings other bodies in"};
     }
-    const auto garment = run.garment("file");
-    if (!garment) return garment.issues();
-    std::optional<mesh::SupportMesh> support;
-    if (run.has("support")) {
-      auto read = run.support("support");
-      if (!read) return read.issues();
-      support = std::move(*read);
-    }
-    const bool searched = params.search == Search::yes || (params.search == Search::automatic && garment->face_count() <= 300000);
-    const auto figures = inspect::measure({}, *garment, support ? &*support : nullptr, searched ? inspect::Depth::full : inspect::Depth::quick);
+    TOILE_TRY(const stage::Fitting fitting, run.fitting("file"));
+    const mesh::GarmentMesh& garment = fitting.garment;
+    if (params.bill) return stage::Output{inspect::to_json(inspect::bill_of_materials(garment)).dump(), {}, {}};
+    const bool searched = params.search == Search::yes || (params.search == Search::automatic && garment.face_count() <= 300000);
+    const auto figures = inspect::measure({}, garment, fitting.support_or_null(), searched ? inspect::Depth::full : inspect::Depth::quick);
     if (!figures) return figures.issues();
-    return stage::Output{run.json() ? inspect::garment_json(name, *garment, *figures).dump(3) : inspect::garment_text(name, *garment, *figures), {}, {}};
+    return stage::Output{run.json() ? inspect::garment_json(name, garment, *figures).dump(3) : inspect::garment_text(name, garment, *figures), {}, {}};
   }
 };
 

@@ -1,7 +1,10 @@
 // Says what the panels are made of.
+#include "toile/inspect/bill.h"
 #include "toile/io/fabric_yaml.h"
 #include "toile/stage/stage.h"
 #include "toile/tailor/layer.h"
+
+#include <algorithm>
 
 namespace {
 
@@ -12,12 +15,12 @@ struct LayerStage {
 
   static stage::Description description() {
     return {.name = "toile-layer",
-            .version = 3,
-            .summary = "Gives each panel its fabric, bonds layers to panels or regions, sets buttons.",
+            .version = 4,
+            .summary = "Gives each panel its fabric, bonds layers to panels or regions, lays free layers, sets buttons, hooks, snaps and zips.",
             .example = "toile-layer sewn.ply --fabrics samples/fabrics/shirting.yaml -o layered.ply --base shirting",
-            .details = "Bonded layers act as one cloth: stiffnesses, masses and thicknesses of the sheets add up (parallel networks). A region is "
-                       "cut to the grid: a triangle belongs to it if its middle does. The summary is the bill of materials. docs/tailoring.md "
-                       "says how the equivalent fabric is found.",
+            .details = "Bonded layers act as one cloth: as parallel networks, as a laminate, or sliding on each other. A region is cut to the grid "
+                       "(a triangle belongs to it if its middle does), or follows lines that toile-mesh made edges of the mesh. The summary is the "
+                       "bill of materials, which toile-info gives again. docs/tailoring.md says how the equivalent fabric is found.",
             .inputs = {{.name = "garment", .doc = "sewn garment", .kind = stage::FileKind::garment},
                        {.name = "fabrics", .doc = "fabric cards (YAML)", .kind = stage::FileKind::fabric, .many = true}},
             .output = stage::FileKind::garment};
@@ -39,13 +42,25 @@ struct LayerStage {
     }
     if (!issues.empty()) return issues;
     TOILE_TRY(tailor::Layered layered, tailor::layer(garment, cards, params));
-    run.report("laminates", layered.garment.laminates.size());
-    run.report("fasteners", layered.garment.fasteners.size());
-    for (const auto& material : layered.materials) {
-      run.report("area_" + material.fabric, material.area, "m2");
-      run.report("mass_" + material.fabric, material.mass, "kg");
+    for (const Issue& note : layered.notes) run.warn(note);
+    const mesh::GarmentMesh& result = layered.garment;
+    run.report("laminates", result.laminates.size());
+    for (const auto& part : layered.layers) {
+      run.report("layer_" + part.name, part.area, "m2");
+      if (part.piece_area) run.report("layer_" + part.name + "_off_the_cloth", std::max(0.0, *part.piece_area - part.area), "m2");
     }
-    run.report("mass", layered.mass, "kg");
+    run.report("free_layers", result.free_layers.size());
+    run.report("closures", result.closures.size());
+    run.report("fasteners", result.fasteners.size());
+    run.report("closed_fasteners", static_cast<std::size_t>(std::count_if(result.fasteners.begin(), result.fasteners.end(), [](const auto& fastener) { return fastener.closed; })));
+    run.report("farthest_snap", layered.farthest_snap, "m");
+    const inspect::Bill bill = inspect::bill_of_materials(result);
+    for (const auto& row : bill.fabrics) {
+      run.report("area_" + row.fabric, row.area, "m2");
+      run.report("mass_" + row.fabric, row.mass, "kg");
+    }
+    for (const auto& row : bill.trims) run.report("mass_" + row.kind, row.mass, "kg");
+    run.report("mass", bill.mass, "kg");
     return stage::Output{std::move(layered.garment), {}, {}};
   }
 };

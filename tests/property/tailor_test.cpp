@@ -10,6 +10,7 @@
 #include "toile/io/pattern_yaml.h"
 #include "toile/io/ply.h"
 #include "toile/mesh/topology.h"
+#include "toile/inspect/bill.h"
 #include "toile/tailor/layer.h"
 #include "toile/tailor/mesh_panels.h"
 #include "toile/tailor/quality.h"
@@ -305,12 +306,31 @@ TEST(tailor_properties, layering_conserves_area_and_mass) {
     params.base = "cloth";
     std::vector<std::array<double, 2>> region;
     for (int k = 0; k < 5; ++k) region.push_back({0.1 * std::cos(1.2566 * k) * rng.uniform(0.5, 1), -0.4 + 0.1 * std::sin(1.2566 * k) * rng.uniform(0.5, 1)});
-    params.bonded = {{"a", "stay", {"front"}, tailor::LayerSide::under, region}, {"b", "stay", {"*"}, tailor::LayerSide::over, {}}};
+    tailor::BondedLayer part, whole;
+    part.name = "a";
+    part.fabric = whole.fabric = "stay";
+    part.panels = {"front"};
+    part.region = region;
+    part.rule = round % 2 ? fabric::Joint::laminate : fabric::Joint::additive;
+    part.angle = rng.uniform(-1, 1);
+    whole.name = "b";
+    whole.panels = {"*"};
+    whole.side = tailor::LayerSide::over;
+    params.bonded = {part, whole};
+    tailor::FastenerSpec button;
+    button.name = "button";
+    button.a = {{.panel = "front", .at = {{0.05, -0.3}}}};
+    button.b = {{.panel = "back", .at = {{0.05, -0.3}}}};
+    button.mass = rng.uniform(0, 0.01);
+    params.fasteners = {button};
     const auto layered = tailor::layer(flat, {card, stay}, params);
     ASSERT_TRUE(layered) << to_string(layered.issues().front());
-    EXPECT_NEAR(layered->mass, mesh::vertex_masses(layered->garment).sum(), 1e-12);
-    double area = 0;
-    for (const auto& material : layered->materials) area += material.fabric == "cloth" ? material.area : 0;
-    EXPECT_NEAR(area, mesh::rest_areas(flat).sum(), 1e-12);
+    const inspect::Bill bill = inspect::bill_of_materials(layered->garment);
+    EXPECT_NEAR(bill.mass, mesh::vertex_masses(layered->garment).sum(), 1e-12);
+    ASSERT_EQ(bill.fabrics.size(), 2u);
+    const double all = mesh::rest_areas(flat).sum();
+    EXPECT_NEAR(bill.fabrics[0].area, all, 1e-12);
+    EXPECT_NEAR(bill.fabrics[1].area, all + layered->layers[0].area, 1e-12);
+    EXPECT_NEAR(layered->layers[1].area, all, 1e-12);
   }
 }

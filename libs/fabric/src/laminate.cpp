@@ -338,8 +338,6 @@ Result<Card> stacked(std::span<const Sheet> sheets, std::span<const Bond> bonds,
   return result;
 }
 
-double bending_along(const Card& card, double angle) { return part_of({card, angle}).bending_stiffness(warp); }
-
 Result<Card> bonded(std::span<const Card> sheets, const std::string& name) {
   std::vector<Sheet> stack;
   for (const Card& card : sheets) stack.push_back({card, 0});

@@ -49,9 +49,6 @@ SlidingFriction sliding_friction(const Card& a, const Card& b, double pressure, 
 /// error   Issue "no_sheets", "bad_fabric"
 Result<Card> stacked(std::span<const Sheet> sheets, std::span<const Bond> bonds, const std::string& name);
 
-/// Bending rigidity per width along a line in a fabric's plane [N m]; the line's angle from the warp [rad].
-double bending_along(const Card& card, double angle);
-
 /// The same of sheets with parallel grains, all joints additive.
 Result<Card> bonded(std::span<const Card> sheets, const std::string& name);
 
