@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <numbers>
 #include <numeric>
@@ -70,8 +71,18 @@ std::vector<std::array<EdgeLine, 3>> edge_lines(const mesh::GarmentMesh& g, Line
     seams[static_cast<std::size_t>(w.a)].push_back(w.seam);
     seams[static_cast<std::size_t>(w.b)].push_back(w.seam);
   }
+  std::set<std::pair<int, int>> folded;
+  for (const mesh::Hinge& hinge : g.hinges) {
+    if (hinge.fold >= 0) folded.insert(std::minmax(hinge.v0, hinge.v1));
+  }
+  for (const mesh::Fold& fold : g.folds) {
+    for (const int run : fold.runs) {
+      const std::vector<int> row = mesh::run_vertex_ids(g, run);
+      for (std::size_t k = 1; k < row.size(); ++k) folded.insert(std::minmax(row[k - 1], row[k]));
+    }
+  }
   for (const mesh::Edge& edge : mesh::edges(g.faces)) {
-    EdgeLine line = lines == Lines::mesh ? EdgeLine::mesh : EdgeLine::none;
+    EdgeLine line = folded.count({edge.a, edge.b}) ? EdgeLine::fold : lines == Lines::mesh ? EdgeLine::mesh : EdgeLine::none;
     if (edge.faces.size() == 1) {
       const auto &a = seams[static_cast<std::size_t>(edge.a)], &b = seams[static_cast<std::size_t>(edge.b)];
       const bool sewn = std::any_of(a.begin(), a.end(), [&](int s) { return std::find(b.begin(), b.end(), s) != b.end(); });
@@ -84,6 +95,81 @@ std::vector<std::array<EdgeLine, 3>> edge_lines(const mesh::GarmentMesh& g, Line
     }
   }
   return flags;
+}
+
+/// Faces in a few kinds, each with a name and a colour.
+struct Categories {
+  std::vector<int> of_face;
+  std::vector<std::pair<std::string, Srgb>> list;
+};
+
+Categories categories(const std::string& color, const mesh::GarmentMesh& g) {
+  Categories result;
+  if (color == "order") {
+    std::map<int, int> place;
+    for (const mesh::Panel& panel : g.panels) place[panel.order] = 0;
+    const double steps = std::max<double>(1, static_cast<double>(place.size()) - 1);
+    // The outermost first, as a legend is read; it is the lightest.
+    for (auto it = place.rbegin(); it != place.rend(); ++it) {
+      it->second = static_cast<int>(result.list.size());
+      result.list.emplace_back(fmt::format("order {}", it->first), sequential_color(0.15 + 0.6 * it->second / steps));
+    }
+    for (Eigen::Index f = 0; f < g.face_count(); ++f) result.of_face.push_back(place[g.panels[static_cast<std::size_t>(g.face_panel[f])].order]);
+    return result;
+  }
+  if (color == "laminate") {
+    for (const mesh::Laminate& laminate : g.laminates) result.list.emplace_back(laminate.name, category_color(laminate.id));
+    const int none = static_cast<int>(result.list.size());
+    if (g.face_laminate.size() > 0 && g.face_laminate.minCoeff() < 0) result.list.emplace_back("no fabric", fabric::Card{}.color);
+    for (Eigen::Index f = 0; f < g.face_count(); ++f) result.of_face.push_back(g.face_laminate[f] >= 0 ? g.face_laminate[f] : none);
+    return result;
+  }
+  for (const mesh::Panel& panel : g.panels) result.list.emplace_back(panel.name, category_color(panel.id));
+  for (Eigen::Index f = 0; f < g.face_count(); ++f) result.of_face.push_back(g.face_panel[f]);
+  return result;
+}
+
+/// Buttons, hooks, snaps and teeth as small balls on the cloth's face; those of open fasteners are lighter.
+/// shown  which vertices' halves are drawn
+std::vector<Surface> fastener_balls(const mesh::GarmentMesh& g, const mesh::Points3& x, const std::function<bool(int)>& shown) {
+  // An octahedron whose faces are cut into four, twice.
+  std::vector<Vector3d> corners{Vector3d::UnitX(), -Vector3d::UnitX(), Vector3d::UnitY(), -Vector3d::UnitY(), Vector3d::UnitZ(), -Vector3d::UnitZ()};
+  std::vector<std::array<int, 3>> faces{{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4}, {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}};
+  for (int round = 0; round < 2; ++round) {
+    std::map<std::pair<int, int>, int> middles;
+    const auto middle = [&](int a, int b) {
+      const auto [found, fresh] = middles.try_emplace(std::minmax(a, b), static_cast<int>(corners.size()));
+      if (fresh) corners.push_back((corners[static_cast<std::size_t>(a)] + corners[static_cast<std::size_t>(b)]).normalized());
+      return found->second;
+    };
+    std::vector<std::array<int, 3>> finer;
+    for (const auto& [a, b, c] : faces) {
+      const int ab = middle(a, b), bc = middle(b, c), ca = middle(c, a);
+      finer.insert(finer.end(), {{a, ab, ca}, {ab, b, bc}, {ca, bc, c}, {ab, bc, ca}});
+    }
+    faces = std::move(finer);
+  }
+  const double extent = (x.colwise().maxCoeff() - x.colwise().minCoeff()).norm();
+  std::vector<Surface> balls(2);
+  balls[0].colors = {linear({0.16, 0.13, 0.11})};
+  balls[1].colors = {linear({0.62, 0.55, 0.45})};
+  for (const mesh::Fastener& fastener : g.fasteners) {
+    const double radius = std::min(fastener.kind == mesh::Fastener::Kind::zip ? 0.002 : 0.007, 0.02 * extent);
+    Surface& surface = balls[fastener.closed ? 0 : 1];
+    surface.kind = Surface::Kind::support;
+    for (const int v : {fastener.a, fastener.b}) {
+      if (!shown(v)) continue;
+      const int base = static_cast<int>(surface.x.size());
+      const Vector3d centre = x.row(v);
+      for (const Vector3d& corner : corners) {
+        surface.x.push_back((centre + radius * corner).cast<float>());
+        surface.normals.push_back(corner.cast<float>());
+      }
+      for (const auto& [a, b, c] : faces) surface.faces.push_back({base + a, base + b, base + c});
+    }
+  }
+  std::erase_if(balls, [](const Surface& surface) { return surface.faces.empty(); });
+  return balls;
 }
 
 /// Values at vertices: averages over the faces of the same panel (vertices are never shared between panels).
@@ -179,6 +265,26 @@ void draw_legend(Image& image, const ColorField& field, const std::array<double,
     draw_text(image, right + 10 * unit, y + 0.5 * text_height, text_height, ink, number_label(scale[0] + i * step, resolution));
   }
   draw_text(image, title_x, y0 - 24 * unit, title_height, ink, field.title);
+}
+
+double categories_width(const Categories& kinds, double unit) {
+  double width = 0;
+  for (const auto& [name, color] : kinds.list) width = std::max(width, text_width(13 * unit, name));
+  return width + 44 * unit;
+}
+
+/// Swatches with names at the right border, as many as have room.
+void draw_categories(Image& image, const Categories& kinds) {
+  const double unit = std::min(image.width, image.height) / 900.0, row = 22 * unit;
+  const double x0 = std::max(4.0, image.width - 8 * unit - categories_width(kinds, unit) + 12 * unit);
+  const auto count = std::min(kinds.list.size(), static_cast<std::size_t>(std::max(0.0, 0.9 * image.height / row)));
+  double y = 0.5 * (image.height - row * static_cast<double>(count));
+  const Srgb ink{0.2, 0.2, 0.22};
+  for (std::size_t k = 0; k < count; ++k, y += row) {
+    const auto& [name, color] = kinds.list[k];
+    fill_rectangle(image, static_cast<int>(x0), static_cast<int>(y + 3 * unit), static_cast<int>(x0 + 16 * unit), static_cast<int>(y + 19 * unit), color);
+    draw_text(image, x0 + 24 * unit, y + 17 * unit, 13 * unit, ink, name);
+  }
 }
 
 /// Positions for the flat view: panels as cut, in rows, none on another. Returns where to write each panel's name.
@@ -349,7 +455,7 @@ Result<ColorField> color_field(const std::string& name, const mesh::GarmentMesh&
   if (const auto it = g.face_columns.find(name); it != g.face_columns.end()) return column(it->second, ColorField::Place::faces);
   if (const auto it = g.vertex_columns.find(name); it != g.vertex_columns.end()) return column(it->second, ColorField::Place::vertices);
   if (name == "ease") return Issue{"needs_support", {.item = "color"}, "ease is the distance to a support, and none is given", "add --support FILE", Category::input};
-  std::vector<std::string> known{"plain", "panel", "strain_warp", "strain_weft", "strain_bias", "shear", "tension_warp", "tension_weft", "ease"};
+  std::vector<std::string> known{"plain", "panel", "laminate", "order", "strain_warp", "strain_weft", "strain_bias", "shear", "tension_warp", "tension_weft", "ease"};
   for (const auto& [key, c] : g.face_columns) known.push_back(key);
   for (const auto& [key, c] : g.vertex_columns) known.push_back(key);
   return Issue{"unknown_color", {.item = "color"}, fmt::format("the garment has nothing called '{}' to show as colour", name), suggestion(name, known), Category::input};
@@ -381,6 +487,7 @@ Result<Image> draw_picture(const PictureParams& params, const mesh::GarmentMesh*
   const Vector3d up = toward.cross(right);
 
   std::optional<ColorField> field;
+  std::optional<Categories> kinds;
   std::array<double, 2> scale{0, 1};
   mesh::Points3 cloth_x;
   std::vector<Vector3d> labels;
@@ -391,7 +498,11 @@ Result<Image> draw_picture(const PictureParams& params, const mesh::GarmentMesh*
     Surface surface;
     surface.kind = Surface::Kind::cloth;
     const auto lines = edge_lines(g, params.lines);
-    if (params.color != "plain" && params.color != "panel") {
+    if (params.color == "panel" || params.color == "laminate" || params.color == "order") {
+      kinds = categories(params.color, g);
+      surface.colors_on_faces = true;
+      for (const int kind : kinds->of_face) surface.colors.push_back(linear(kinds->list[static_cast<std::size_t>(kind)].second));
+    } else if (params.color != "plain") {
       auto found = color_field(params.color, g, measured_from);
       if (!found) return found.issues();
       field = std::move(*found);
@@ -410,8 +521,7 @@ Result<Image> draw_picture(const PictureParams& params, const mesh::GarmentMesh*
       for (const auto& laminate : g.laminates) palette.push_back(linear(laminate.equivalent.color));
       const Vector3f unknown = linear(fabric::Card{}.color);
       for (Eigen::Index f = 0; f < g.face_count(); ++f) {
-        if (params.color == "panel") surface.colors.push_back(linear(category_color(g.face_panel[f])));
-        else surface.colors.push_back(g.face_laminate[f] >= 0 ? palette[static_cast<std::size_t>(g.face_laminate[f])] : unknown);
+        surface.colors.push_back(g.face_laminate[f] >= 0 ? palette[static_cast<std::size_t>(g.face_laminate[f])] : unknown);
       }
     }
     surface.vertex_lines.assign(static_cast<std::size_t>(g.vertex_count()), EdgeLine::none);
@@ -430,7 +540,10 @@ Result<Image> draw_picture(const PictureParams& params, const mesh::GarmentMesh*
     surface.lines = lines;
     add_surface(scene, std::move(surface), cloth_x, cloth_normals(g, cloth_x));
     // Depth along the level direction of view: the near half is left out.
-    if (inside) keep_far_half(scene.surfaces.back(), centre.cast<float>(), Vector3f(static_cast<float>(toward.x()), 0, static_cast<float>(toward.z())));
+    const Vector3d level(toward.x(), 0, toward.z());
+    if (inside) keep_far_half(scene.surfaces.back(), centre.cast<float>(), level.cast<float>());
+    const auto shown = [&](int v) { return !inside || (cloth_x.row(v).transpose() - centre).dot(level) <= 0; };
+    for (Surface& balls : fastener_balls(g, cloth_x, shown)) scene.surfaces.push_back(std::move(balls));
   }
   if (support != nullptr) {
     Surface surface;
@@ -469,7 +582,10 @@ Result<Image> draw_picture(const PictureParams& params, const mesh::GarmentMesh*
     plane_high = plane_high.cwiseMax(q);
   }
   const double margin = 0.045 * std::min(scene.width, scene.height);
-  const double legend = field ? 0.11 * std::min(scene.width, scene.height) : 0;
+  // Names of panels stand under the panels of the flat view.
+  const bool named = kinds && (params.color != "panel" || !flat);
+  const double unit = std::min(scene.width, scene.height) / 900.0;
+  const double legend = field ? 0.11 * std::min(scene.width, scene.height) : named ? std::min(categories_width(*kinds, unit), 0.4 * scene.width) : 0;
   const Vector2d free(scene.width - 2 * margin - legend, scene.height - 2 * margin);
   const Vector2d span = (plane_high - plane_low).cwiseMax(1e-9);
   camera.metres_per_pixel = std::max(span.x() / free.x(), span.y() / free.y()) / params.zoom;
@@ -494,6 +610,7 @@ Result<Image> draw_picture(const PictureParams& params, const mesh::GarmentMesh*
     const std::string& name = garment->panels[p].name;
     draw_text(*image, q.x() - 0.5 * text_width(height, name), -q.y() + height, height, {0.25, 0.25, 0.28}, name);
   }
+  if (named) draw_categories(*image, *kinds);
   if (field) draw_legend(*image, *field, scale, params.background);
   return image;
 }

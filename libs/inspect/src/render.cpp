@@ -265,8 +265,8 @@ class Tracer {
     const float to_pixels = 1 / (scale * line_unit_);
     float factor = 1;
     const auto draw = [&](EdgeLine line, float distance) {
-      const float half_width = line == EdgeLine::border ? 1.7f : line == EdgeLine::seam ? 0.85f : 0.45f;
-      const float depth = line == EdgeLine::border ? 0.55f : line == EdgeLine::seam ? 0.45f : 0.30f;
+      const float half_width = line == EdgeLine::border ? 1.7f : line == EdgeLine::fold ? 1.2f : line == EdgeLine::seam ? 0.85f : 0.45f;
+      const float depth = line == EdgeLine::border ? 0.55f : line == EdgeLine::fold ? 0.5f : line == EdgeLine::seam ? 0.45f : 0.30f;
       if (distance * to_pixels < half_width) factor = std::min(factor, 1 - depth);
     };
     const Vector3f p = w[0] * v[0] + w[1] * v[1] + w[2] * v[2];
@@ -279,6 +279,7 @@ class Tracer {
       }
       const EdgeLine line = surface.lines[face][corner];
       if (line == EdgeLine::none) continue;
+      if (line == EdgeLine::fold && std::abs(w[(k + 1) % 3] - w[(k + 2) % 3]) > 0.5f) continue;
       const float length = (v[(k + 2) % 3] - v[(k + 1) % 3]).norm();
       if (length > 0) draw(line, w[k] * double_area / length);
     }

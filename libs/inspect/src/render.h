@@ -10,7 +10,8 @@
 
 namespace toile::inspect {
 
-enum class EdgeLine : unsigned char { none, mesh, seam, border };
+/// From the faintest to the strongest. Folds are dashed, one dash a mesh edge.
+enum class EdgeLine : unsigned char { none, mesh, fold, seam, border };
 
 struct Surface {
   enum class Kind { cloth, support };
