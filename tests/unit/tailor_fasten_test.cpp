@@ -203,16 +203,32 @@ TEST(zip, wide_teeth_leave_particles_out_and_sewn_ends_are_skipped) {
   EXPECT_NEAR(mass, 0.012 * 0.04, 1e-15);
 }
 
+TEST(zip, on_a_stretch_of_an_edge) {
+  mesh::GarmentMesh g = two_panels(8, 8);
+  g.points.push_back({0, "top", mesh::run_vertex_ids(g, 1)[6]});
+  g.points.push_back({1, "top", mesh::run_vertex_ids(g, 7)[2]});
+  tailor::FastenParams params;
+  params.zips = {zip({"left.right(bottom_right..top)"}, {"-right.left(top..bottom_left)"})};
+  const auto result = fastened(g, params);
+  EXPECT_EQ(result.garment.fasteners.size(), 7u);
+  for (const auto& tooth : result.garment.fasteners) {
+    EXPECT_EQ(g.uv(tooth.a, 1), g.uv(tooth.b, 1));
+    EXPECT_LE(g.uv(tooth.a, 1), 0.03 + 1e-12);
+  }
+}
+
 TEST(zip, refusals) {
   mesh::GarmentMesh g = two_panels(4, 4);
   tailor::FastenParams params;
   params.zips = {zip({"left.right"}, {"right.left"})};  // twisted
   EXPECT_EQ(codes(tailor::fasten(g, params)), std::vector<std::string>{"bad_zip"});
   params.zips = {zip({"left.right", "left.tpo"}, {"-right"})};
-  EXPECT_EQ(codes(tailor::fasten(g, params)), (std::vector<std::string>{"unknown_edge", "bad_zip"}));
+  EXPECT_EQ(codes(tailor::fasten(g, params)), (std::vector<std::string>{"unknown_line", "bad_reference"}));
   params.zips = {zip({"left.right", "-left.top"}, {"-right.left"})};
   EXPECT_EQ(codes(tailor::fasten(g, params)), std::vector<std::string>{"bad_zip"});
-  g.runs[1].length = 0.05;
+  for (auto& row : g.run_vertices) {
+    if (row.run == 1) row.s *= 1.25;
+  }
   params.zips = {zip({"left.right"}, {"-right.left"})};
   EXPECT_EQ(codes(tailor::fasten(g, params)), std::vector<std::string>{"bad_zip"});
   params.zips[0].ease = 0.01;

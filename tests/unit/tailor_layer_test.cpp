@@ -455,7 +455,7 @@ TEST(layer, outline_of_a_closed_line) {
   params.bonded[0].panels = {"front"};
   EXPECT_NEAR(covered_area(layered(g, wool_and_canvas(), params).garment, 1, 2), 0, 1e-15);
   params.bonded[0].outline = {"front.chets"};
-  EXPECT_EQ(codes(tailor::layer(g, wool_and_canvas(), params)), std::vector<std::string>{"unknown_edge"});
+  EXPECT_EQ(codes(tailor::layer(g, wool_and_canvas(), params)), std::vector<std::string>{"unknown_line"});
 }
 
 TEST(layer, outline_of_edges_and_lines) {
@@ -475,6 +475,14 @@ TEST(layer, outline_of_edges_and_lines) {
   params.bonded[0].inside = std::array{0.03, 0.01};
   params.bonded[0].outline = {"top"};
   EXPECT_EQ(codes(tailor::layer(g, wool_and_canvas(), params)), std::vector<std::string>{"open_outline"});
+  // A stretch of an edge closes the outline, whichever way the edge runs.
+  g.points.push_back({0, "notch", mesh::run_vertex_ids(g, 1)[5]});
+  g.points.push_back({0, "notch_left", mesh::run_vertex_ids(g, 3)[3]});
+  params.bonded[0].inside.reset();
+  for (const char* stretch : {"right(notch..top_right)", "right(top_right..notch)"}) {
+    params.bonded[0].outline = {"yoke", "top", stretch, "left(top_left..notch_left)"};
+    EXPECT_NEAR(covered_area(layered(g, wool_and_canvas(), params).garment, 0, 2), 0.06 * 0.03, 1e-15);
+  }
   // All edges of the panel enclose the panel.
   params.bonded[0].inside.reset();
   params.bonded[0].outline = {"left", "top", "right", "bottom"};

@@ -1,5 +1,6 @@
 #include "toile/tailor/fasten.h"
 
+#include "line_part.h"
 #include "names.h"
 #include "pairing.h"
 
@@ -74,37 +75,32 @@ int sense_of(const GarmentMesh& garment, int panel, int a, int b) {
   return sense;
 }
 
-Side side_of(const GarmentMesh& garment, Names& names, Issues& issues, const std::vector<std::string>& chain, const std::string& item) {
+Side side_of(const GarmentMesh& garment, Issues& issues, const std::vector<std::string>& chain, const std::string& item) {
   Side side;
   bool mixed = false;
   for (const std::string& text : chain) {
-    const auto reference = split_reference(text);
-    if (!reference) {
-      issues.push_back({"bad_zip", {.item = item}, fmt::format("'{}' is not panel.edge", text), "write the panel's name, a dot, the edge's name; '-' before it runs it backwards"});
-      continue;
-    }
-    const auto panel = mesh::find_panel(garment, reference->panel);
-    if (!panel) {
-      Issue issue = panel.issues().front();
+    const auto line = find_line(garment, text);
+    if (!line) {
+      Issue issue = line.issues().front();
       issue.place.item = item;
       issues.push_back(issue);
       continue;
     }
-    const auto run = names.run(*panel, reference->item, item);
-    if (!run) continue;
-    const double length = garment.runs[static_cast<std::size_t>(*run)].length;
-    std::vector<Node> nodes;
-    for (const auto& row : garment.run_vertices) {
-      if (row.run == *run) nodes.push_back({reference->reversed ? length - row.s : row.s, row.vertex});
+    if (line->vertices.front() == line->vertices.back()) {
+      issues.push_back({"bad_zip", {.item = item}, fmt::format("'{}' closes round: a zip has two ends", text), "name a stretch of it: panel.line(from..to)"});
+      continue;
     }
-    if (reference->reversed) std::reverse(nodes.begin(), nodes.end());
-    if (nodes.size() < 2) continue;
-    const int sense = sense_of(garment, *panel, nodes[0].vertex, nodes[1].vertex);
+    std::map<int, double> s_of;
+    for (const auto& row : garment.run_vertices) {
+      if (row.run == line->run) s_of[row.vertex] = row.s;
+    }
+    const int sense = sense_of(garment, garment.runs[static_cast<std::size_t>(line->run)].panel, line->vertices[0], line->vertices[1]);
     if (sense != 0 && side.sense != 0 && sense != side.sense) mixed = true;
     if (sense != 0) side.sense = sense;
     // Where one edge ends and the next begins there is one place.
-    for (std::size_t k = side.nodes.empty() ? 0 : 1; k < nodes.size(); ++k) side.nodes.push_back({side.length + nodes[k].s, nodes[k].vertex});
-    side.length += length;
+    const double start = s_of[line->vertices.front()];
+    for (std::size_t k = side.nodes.empty() ? 0 : 1; k < line->vertices.size(); ++k) side.nodes.push_back({side.length + std::abs(s_of[line->vertices[k]] - start), line->vertices[k]});
+    side.length = side.nodes.back().s;
   }
   if (mixed) issues.push_back({"bad_zip", {.item = item}, "one of its edges runs against the others of its side", "put '-' before it, or take it away"});
   return side;
@@ -198,7 +194,7 @@ Result<Fastened> fasten(const GarmentMesh& garment, const FastenParams& params) 
     const auto closed = switches.closed(spec.name);
     const double slider = closed ? (*closed ? 1.0 : 0.0) : spec.slider;
     const std::size_t before = issues.size();
-    const Side a = side_of(garment, names, issues, spec.a, item), b = side_of(garment, names, issues, spec.b, item);
+    const Side a = side_of(garment, issues, spec.a, item), b = side_of(garment, issues, spec.b, item);
     if (issues.size() > before) continue;
     if (a.nodes.empty() || b.nodes.empty()) {
       issues.push_back({"bad_zip", {.item = item}, fmt::format("side {} names no edge", a.nodes.empty() ? "a" : "b"), "name at least one: panel.edge"});

@@ -1,5 +1,6 @@
 #include "toile/tailor/layer.h"
 
+#include "line_part.h"
 #include "names.h"
 #include "region.h"
 #include "remove_panels.h"
@@ -158,25 +159,43 @@ class Layering {
     }
   }
 
+  /// A line of a panel, or a stretch of one, as a row of vertices. In a mirrored copy edges run the other way.
+  Result<std::vector<int>> line_of(const std::string& panel, const std::string& name) const {
+    auto part = find_line(result_.garment, panel + "." + name);
+    const auto open = name.find('('), dots = name.find("..");
+    if (!part && part.issues().front().code == "bad_range" && open < dots) {
+      part = find_line(result_.garment, fmt::format("{}.{}({}..{})", panel, name.substr(0, open), name.substr(dots + 2, name.size() - dots - 3), name.substr(open + 1, dots - open - 1)));
+    }
+    if (!part) return part.issues();
+    return std::move(part->vertices);
+  }
+
   /// Faces of one panel that a layer covers.
-  std::vector<int> covered_faces(const BondedLayer& layer, int panel, const std::vector<int>& faces, Names& names, const std::string& item) {
+  std::vector<int> covered_faces(const BondedLayer& layer, int panel, const std::vector<int>& faces, const std::string& item) {
     const GarmentMesh& garment = result_.garment;
     std::vector<int> covered;
     if (!layer.outline.empty()) {
       const auto& row = garment.panels[static_cast<std::size_t>(panel)];
-      std::vector<int> runs;
+      Lines lines;
       const std::size_t before = issues_.size();
       for (const std::string& text : layer.outline) {
         const auto reference = split_reference(text);
         if (reference && reference->panel != row.name && reference->panel != row.piece) continue;
-        if (const auto run = names.run(panel, reference ? reference->item : text, item)) runs.push_back(*run);
+        auto line = line_of(row.name, reference ? reference->item : text);
+        if (line) {
+          lines.push_back(std::move(*line));
+          continue;
+        }
+        Issue issue = line.issues().front();
+        issue.place.item = item;
+        issues_.push_back(issue);
       }
       if (issues_.size() > before) return {};
-      if (runs.empty()) {
+      if (lines.empty()) {
         issues_.push_back({"open_outline", {.item = item}, fmt::format("none of its lines is on panel '{}'", row.name), "name its lines too, or take the panel out"});
         return {};
       }
-      auto found = layer.inside ? same_side(garment, panel, faces, runs, *layer.inside) : enclosed_by(garment, faces, runs);
+      auto found = layer.inside ? same_side(garment, panel, faces, lines, *layer.inside) : enclosed_by(garment, faces, lines);
       if (found) return std::move(*found);
       Issue issue = found.issues().front();
       issue.place.item = item;
@@ -242,7 +261,7 @@ class Layering {
       LayerReport report{layer.name, 0, std::nullopt};
       for (int panel : panels) {
         const bool mirrored = garment.panels[static_cast<std::size_t>(panel)].mirrored && layer.angle != 0;
-        for (int f : covered_faces(layer, panel, faces[static_cast<std::size_t>(panel)], names, item)) {
+        for (int f : covered_faces(layer, panel, faces[static_cast<std::size_t>(panel)], item)) {
           Stack& stack = stacks_[static_cast<std::size_t>(f)];
           stack.insert(layer.side == LayerSide::under ? stack.end() : stack.begin(), {card, static_cast<int>(k), mirrored});
           report.area += areas[f];

@@ -18,7 +18,8 @@ std::optional<Reference> split_reference(const std::string& text) {
   Reference reference;
   std::string_view rest = trim(text);
   if (!rest.empty() && rest.front() == '-') reference.reversed = true, rest = trim(rest.substr(1));
-  const auto dot = rest.find('.');
+  // The dots of a stretch (from..to) are no separators.
+  const auto dot = rest.substr(0, rest.find('(')).find('.');
   if (dot == std::string_view::npos || dot == 0 || dot + 1 == rest.size()) return std::nullopt;
   reference.panel = rest.substr(0, dot);
   reference.item = rest.substr(dot + 1);
@@ -52,15 +53,6 @@ std::vector<int> Names::panels_of(const std::string& panel_or_piece) const {
     if (panel.name == panel_or_piece || panel.piece == panel_or_piece) found.push_back(panel.id);
   }
   return found;
-}
-
-std::optional<int> Names::run(int panel, const std::string& name, const std::string& item) {
-  const auto found = mesh::find_run(garment_, panel, name);
-  if (found) return *found;
-  Issue issue = found.issues().front();
-  issue.place.item = item;
-  issues_.push_back(issue);
-  return std::nullopt;
 }
 
 std::optional<int> Names::twin(int panel) const {

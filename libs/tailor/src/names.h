@@ -19,7 +19,7 @@ struct Reference {
   bool reversed = false;
   std::string panel, item;
 };
-/// "panel.item" or "-panel.item".
+/// "panel.item" or "-panel.item"; the item may be a stretch "line(from..to)".
 std::optional<Reference> split_reference(const std::string& text);
 
 /// Looks names up in a garment and collects what is not there.
@@ -34,7 +34,6 @@ class Names {
   std::vector<int> panels(const std::vector<std::string>& patterns, const std::string& item);
   /// Panels of that name or cut from the piece of that name; no issue.
   std::vector<int> panels_of(const std::string& panel_or_piece) const;
-  std::optional<int> run(int panel, const std::string& name, const std::string& item);
   /// The panel that is cut as the mirror image of this one.
   std::optional<int> twin(int panel) const;
 

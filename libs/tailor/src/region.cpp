@@ -13,11 +13,10 @@ Eigen::Vector2d plain(const mesh::GarmentMesh& garment, int panel, const Eigen::
 
 std::array<int, 2> edge(int a, int b) { return {std::min(a, b), std::max(a, b)}; }
 
-/// Edges along the runs, ascending.
-std::vector<std::array<int, 2>> run_edges(const mesh::GarmentMesh& garment, const std::vector<int>& runs) {
+/// Edges along the lines, ascending.
+std::vector<std::array<int, 2>> line_edges(const Lines& lines) {
   std::vector<std::array<int, 2>> edges;
-  for (int run : runs) {
-    const std::vector<int> row = mesh::run_vertex_ids(garment, run);
+  for (const auto& row : lines) {
     for (std::size_t k = 1; k < row.size(); ++k) edges.push_back(edge(row[k - 1], row[k]));
   }
   std::sort(edges.begin(), edges.end());
@@ -96,10 +95,10 @@ Eigen::Vector2d plain_middle(const mesh::GarmentMesh& garment, int face) {
   return plain(garment, garment.face_panel[face], middle);
 }
 
-Result<std::vector<int>> enclosed_by(const mesh::GarmentMesh& garment, const std::vector<int>& faces, const std::vector<int>& runs) {
+Result<std::vector<int>> enclosed_by(const mesh::GarmentMesh& garment, const std::vector<int>& faces, const Lines& lines) {
   std::map<int, int> ends;
   std::vector<std::array<Eigen::Vector2d, 2>> segments;
-  for (const auto& [a, b] : run_edges(garment, runs)) {
+  for (const auto& [a, b] : line_edges(lines)) {
     ++ends[a];
     ++ends[b];
     segments.push_back({garment.uv.row(a), garment.uv.row(b)});
@@ -118,8 +117,8 @@ Result<std::vector<int>> enclosed_by(const mesh::GarmentMesh& garment, const std
   return result;
 }
 
-Result<std::vector<int>> same_side(const mesh::GarmentMesh& garment, int panel, const std::vector<int>& faces, const std::vector<int>& runs, const std::array<double, 2>& inside) {
-  const std::vector<std::array<int, 2>> walls = run_edges(garment, runs);
+Result<std::vector<int>> same_side(const mesh::GarmentMesh& garment, int panel, const std::vector<int>& faces, const Lines& lines, const std::array<double, 2>& inside) {
+  const std::vector<std::array<int, 2>> walls = line_edges(lines);
   const Eigen::Vector2d seed = plain(garment, panel, {inside[0], inside[1]});
   int start = -1;
   for (std::size_t k = 0; k < faces.size() && start < 0; ++k) {

@@ -39,13 +39,16 @@ Outline panel_outline(const mesh::GarmentMesh& garment, int panel, const std::ve
 /// Middle of a face in panel coordinates; in a mirrored panel that of the mirror image.
 Eigen::Vector2d plain_middle(const mesh::GarmentMesh& garment, int face);
 
-/// The faces that runs of a panel enclose.
+/// Lines of a panel as rows of vertices.
+using Lines = std::vector<std::vector<int>>;
+
+/// The faces that lines of a panel enclose.
 /// faces   those of the panel
 /// error   Issue "open_outline" (without place)
-Result<std::vector<int>> enclosed_by(const mesh::GarmentMesh& garment, const std::vector<int>& faces, const std::vector<int>& runs);
+Result<std::vector<int>> enclosed_by(const mesh::GarmentMesh& garment, const std::vector<int>& faces, const Lines& lines);
 
-/// The faces on the same side of runs of a panel as a position (of the mirror image in a mirrored panel).
+/// The faces on the same side of lines of a panel as a position (of the mirror image in a mirrored panel).
 /// error   Issue "open_outline", "empty_region"
-Result<std::vector<int>> same_side(const mesh::GarmentMesh& garment, int panel, const std::vector<int>& faces, const std::vector<int>& runs, const std::array<double, 2>& inside);
+Result<std::vector<int>> same_side(const mesh::GarmentMesh& garment, int panel, const std::vector<int>& faces, const Lines& lines, const std::array<double, 2>& inside);
 
 }  // namespace toile::tailor

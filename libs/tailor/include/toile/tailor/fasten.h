@@ -72,7 +72,7 @@ struct ZipSpec {
   double capture = 0;
   static void describe(auto& f) {
     f(&ZipSpec::name, {.key = "name", .doc = "name", .required = true});
-    f(&ZipSpec::a, {.key = "a", .doc = "edges of the first side from the zip's bottom on, panel.edge; '-' before one runs it backwards", .required = true});
+    f(&ZipSpec::a, {.key = "a", .doc = "edges of the first side from the zip's bottom on, panel.edge or a stretch panel.edge(from..to); '-' before one runs it backwards", .required = true});
     f(&ZipSpec::b, {.key = "b", .doc = "edges of the second side, in the same direction", .required = true});
     f(&ZipSpec::slider, {.key = "slider", .doc = "how far up it is closed", .unit = "1", .min = 0, .max = 1});
     f(&ZipSpec::pitch, {.key = "pitch", .doc = "distance of its teeth", .unit = "m", .min = 1e-4, .max = 0.1});
@@ -115,7 +115,7 @@ struct FreeSpec {
 
 /// Adds closures with their fasteners; replaces those that are there.
 /// open, closed  names of fasteners and zips that are to be open or closed whatever their spec says; * stands for any letters
-/// error  "bad_fastener", "bad_zip", "unknown_fastener", "unknown_point", "unknown_panel", "unknown_edge", "duplicate_name"
+/// error  "bad_fastener", "bad_zip", "unknown_fastener", "unknown_point", "unknown_panel", "unknown_line", "duplicate_name"
 struct FastenParams {
   std::vector<FastenerSpec> fasteners;
   std::vector<ZipSpec> zips;

@@ -41,7 +41,7 @@ struct BondedLayer {
     f(&BondedLayer::panels, {.key = "panels", .doc = "panels that get it; * stands for any letters; may be left out where `outline` names panels"});
     f(&BondedLayer::side, {.key = "side", .doc = "under: on the back of the cloth; over: on its face"});
     f(&BondedLayer::region, {.key = "region", .doc = "corners (u, v) of the part that gets it, in panel coordinates (mirrored panels: those of the plain one); without region, outline and piece the whole panel", .unit = "m"});
-    f(&BondedLayer::outline, {.key = "outline", .doc = "edges and internal lines of the mesh that enclose the part that gets it: line or panel.line (panel or its piece)"});
+    f(&BondedLayer::outline, {.key = "outline", .doc = "edges and internal lines of the mesh that enclose the part that gets it: line or panel.line (panel or its piece), or a stretch line(from..to)"});
     f(&BondedLayer::inside, {.key = "inside", .doc = "a position (u, v) in the part that gets it, where the outline's lines run from border to border", .unit = "m"});
     f(&BondedLayer::piece, {.key = "piece", .doc = "a piece of the garment, not sewn to anything, that is laid on: its outline is the part, and its panels are used up"});
     f(&BondedLayer::at, {.key = "at", .doc = "where the origin of the piece's coordinates comes to lie, in those of the panel (mirrored panels: of the plain one)", .unit = "m"});
@@ -108,7 +108,7 @@ struct Layered {
 /// Gives every face its laminate, and the garment its free layers, tacks and fasteners. Replaces those that are there.
 /// cards  the fabrics that the spec may name
 /// error  "unknown_fabric", "no_fabric", "duplicate_fabric", "unknown_panel", "ambiguous_fabric", "duplicate_name", "bad_region",
-///        "empty_region", "open_outline", "unknown_edge", "piece_sewn", "bad_friction", those of fasten.h and fabric::stacked
+///        "empty_region", "open_outline", "unknown_line", "piece_sewn", "bad_friction", those of fasten.h and fabric::stacked
 Result<Layered> layer(const mesh::GarmentMesh& garment, const std::vector<fabric::Card>& cards, const LayerParams& params);
 
 }  // namespace toile::tailor
