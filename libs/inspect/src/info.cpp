@@ -53,11 +53,14 @@ std::string panel_names(const mesh::GarmentMesh& g, const std::vector<int>& pane
   return fmt::format("{}", fmt::join(names, " "));
 }
 
-/// Length of each fold in panel coordinates: along its lines, or along its hinges where no line is known.
+/// Length of each fold in panel coordinates: along its lines; where it runs along part of a line, the turn of all its hinges
+/// times their length over the angle of the fold, since the turn across it is the same all along.
 std::vector<double> fold_lengths(const mesh::GarmentMesh& g) {
   std::vector<double> lengths(g.folds.size(), 0);
   for (const mesh::Hinge& hinge : g.hinges) {
-    if (hinge.fold >= 0 && g.folds[static_cast<std::size_t>(hinge.fold)].runs.empty()) lengths[static_cast<std::size_t>(hinge.fold)] += (g.uv.row(hinge.v1) - g.uv.row(hinge.v0)).norm();
+    if (hinge.fold < 0) continue;
+    const mesh::Fold& fold = g.folds[static_cast<std::size_t>(hinge.fold)];
+    if (fold.runs.empty() && fold.angle != 0) lengths[static_cast<std::size_t>(hinge.fold)] += hinge.rest_angle / fold.angle * (g.uv.row(hinge.v1) - g.uv.row(hinge.v0)).norm();
   }
   for (const mesh::Fold& fold : g.folds) {
     for (const int run : fold.runs) lengths[static_cast<std::size_t>(fold.id)] += g.runs[static_cast<std::size_t>(run)].length;
@@ -117,7 +120,7 @@ std::string construction_text(const mesh::GarmentMesh& g) {
     out += "\nfolds\n";
     const std::vector<double> lengths = fold_lengths(g);
     rows = {{"name", "kind", "angle deg", "radius mm", "length mm"}};
-    for (const mesh::Fold& fold : g.folds) rows.push_back({fold.name, fold.kind, fmt::format("{:.1f}", fold.angle / degree), millimetres(fold.radius), millimetres(lengths[static_cast<std::size_t>(fold.id)])});
+    for (const mesh::Fold& fold : g.folds) rows.push_back({fold.name, fold.kind, fmt::format("{:.1f}", fold.angle / degree), millimetres(fold.radius), (fold.runs.empty() ? "about " : "") + millimetres(lengths[static_cast<std::size_t>(fold.id)])});
     out += text_table(rows, Alignment::by_content);
   }
   if (!g.trims.empty()) {
@@ -177,7 +180,7 @@ Json construction_json(const mesh::GarmentMesh& g, Json out) {
   for (const mesh::FreeLayer& layer : g.free_layers) layers.push(Json::object().set("name", layer.name).set("panels", names(layer.panels)).set("on", names(layer.on)).set("side", layer.outside ? "outside" : "inside"));
   for (const mesh::Panel& panel : g.panels) order.set(panel.name, panel.order);
   const std::vector<double> lengths = fold_lengths(g);
-  for (const mesh::Fold& fold : g.folds) folds.push(Json::object().set("name", fold.name).set("kind", fold.kind).set("angle", fold.angle).set("radius", fold.radius).set("length", lengths[static_cast<std::size_t>(fold.id)]));
+  for (const mesh::Fold& fold : g.folds) folds.push(Json::object().set("name", fold.name).set("kind", fold.kind).set("angle", fold.angle).set("radius", fold.radius).set("length", lengths[static_cast<std::size_t>(fold.id)]).set("length_estimated", fold.runs.empty()));
   for (const mesh::Trim& trim : g.trims) {
     trims.push(Json::object().set("name", trim.name).set("kind", trim.kind).set("seam", trim.seam < 0 ? Json() : Json(g.seams[static_cast<std::size_t>(trim.seam)].name)).set("stretch", trim.stretch).set("bending", trim.bending).set("linear_density", trim.linear_density).set("rest_ratio", trim.rest_ratio));
   }

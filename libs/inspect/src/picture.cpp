@@ -73,7 +73,8 @@ std::vector<std::array<EdgeLine, 3>> edge_lines(const mesh::GarmentMesh& g, Line
   }
   std::set<std::pair<int, int>> folded;
   for (const mesh::Hinge& hinge : g.hinges) {
-    if (hinge.fold >= 0) folded.insert(std::minmax(hinge.v0, hinge.v1));
+    // Of a fold whose line is known only the line is drawn, not the band of a roll.
+    if (hinge.fold >= 0 && g.folds[static_cast<std::size_t>(hinge.fold)].runs.empty()) folded.insert(std::minmax(hinge.v0, hinge.v1));
   }
   for (const mesh::Fold& fold : g.folds) {
     for (const int run : fold.runs) {
@@ -287,8 +288,18 @@ void draw_categories(Image& image, const Categories& kinds) {
   }
 }
 
-/// Positions for the flat view: panels as cut, in rows, none on another. Returns where to write each panel's name.
-std::vector<Vector3d> lay_out_flat(const mesh::GarmentMesh& g, double aspect, mesh::Points3& x) {
+struct FlatLayout {
+  struct Label {
+    int panel = 0;
+    Vector3d at;      ///< middle of the name's upper line
+    double room = 0;  ///< width that the name may take [m]
+  };
+  mesh::Points3 x;
+  std::vector<Label> labels;
+};
+
+/// Positions for the flat view: panels as cut, in rows, none on another, and where to write their names.
+FlatLayout lay_out_flat(const mesh::GarmentMesh& g, double aspect) {
   const std::size_t n = g.panels.size();
   std::vector<Vector2d> low(n, Vector2d::Constant(1e300)), high(n, Vector2d::Constant(-1e300));
   for (Eigen::Index v = 0; v < g.vertex_count(); ++v) {
@@ -331,13 +342,14 @@ std::vector<Vector3d> lay_out_flat(const mesh::GarmentMesh& g, double aspect, me
       best = origin;
     }
   }
-  x = mesh::Points3::Zero(g.vertex_count(), 3);
-  for (Eigen::Index v = 0; v < g.vertex_count(); ++v) x.row(v).head<2>() = g.uv.row(v) + best[static_cast<std::size_t>(g.vertex_panel[v])].transpose();
-  std::vector<Vector3d> labels(n, Vector3d::Constant(std::nan("")));
+  FlatLayout layout;
+  layout.x = mesh::Points3::Zero(g.vertex_count(), 3);
+  for (Eigen::Index v = 0; v < g.vertex_count(); ++v) layout.x.row(v).head<2>() = g.uv.row(v) + best[static_cast<std::size_t>(g.vertex_panel[v])].transpose();
   for (std::size_t p = 0; p < n; ++p) {
-    if (high[p].x() >= low[p].x()) labels[p] = Vector3d(0.5 * (low[p].x() + high[p].x()) + best[p].x(), low[p].y() + best[p].y() - 0.35 * gap, 0);
+    if (high[p].x() < low[p].x()) continue;
+    layout.labels.push_back({static_cast<int>(p), Vector3d(0.5 * (low[p].x() + high[p].x()) + best[p].x(), low[p].y() + best[p].y() - 0.35 * gap, 0), high[p].x() - low[p].x() + 0.85 * gap});
   }
-  return labels;
+  return layout;
 }
 
 Result<std::array<int, 2>> picture_size(const std::string& text) {
@@ -490,11 +502,15 @@ Result<Image> draw_picture(const PictureParams& params, const mesh::GarmentMesh*
   std::optional<Categories> kinds;
   std::array<double, 2> scale{0, 1};
   mesh::Points3 cloth_x;
-  std::vector<Vector3d> labels;
+  std::vector<FlatLayout::Label> labels;
   if (garment != nullptr && garment->face_count() > 0) {
     const mesh::GarmentMesh& g = *garment;
     cloth_x = g.x;
-    if (flat) labels = lay_out_flat(g, static_cast<double>(scene.width) / scene.height, cloth_x);
+    if (flat) {
+      FlatLayout layout = lay_out_flat(g, static_cast<double>(scene.width) / scene.height);
+      cloth_x = std::move(layout.x);
+      labels = std::move(layout.labels);
+    }
     Surface surface;
     surface.kind = Surface::Kind::cloth;
     const auto lines = edge_lines(g, params.lines);
@@ -603,12 +619,13 @@ Result<Image> draw_picture(const PictureParams& params, const mesh::GarmentMesh*
 
   auto image = render(scene);
   if (!image) return image;
-  for (std::size_t p = 0; p < labels.size(); ++p) {
-    if (labels[p].array().isNaN().any()) continue;
-    const Vector2d q = (camera.project(labels[p]) - camera.corner) / camera.metres_per_pixel;
-    const double height = 0.014 * std::min(scene.width, scene.height);
-    const std::string& name = garment->panels[p].name;
-    draw_text(*image, q.x() - 0.5 * text_width(height, name), -q.y() + height, height, {0.25, 0.25, 0.28}, name);
+  for (const FlatLayout::Label& label : labels) {
+    const Vector2d q = (camera.project(label.at) - camera.corner) / camera.metres_per_pixel;
+    const std::string& name = garment->panels[static_cast<std::size_t>(label.panel)].name;
+    // Long names under narrow panels are written smaller, so that neighbours stay apart.
+    const double full = 0.014 * std::min(scene.width, scene.height);
+    const double height = std::clamp(full * label.room / camera.metres_per_pixel / std::max(text_width(full, name), 1e-9), 0.6 * full, full);
+    draw_text(*image, q.x() - 0.5 * text_width(height, name), -q.y() + full, height, {0.25, 0.25, 0.28}, name);
   }
   if (named) draw_categories(*image, *kinds);
   if (field) draw_legend(*image, *field, scale, params.background);
