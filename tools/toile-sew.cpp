@@ -1,5 +1,6 @@
 // Sews the panels of a garment together.
 #include "toile/stage/stage.h"
+#include "toile/tailor/pleat.h"
 #include "toile/tailor/quality.h"
 #include "toile/tailor/sew.h"
 
@@ -31,9 +32,12 @@ struct SewStage {
 
   static Result<stage::Output> run(const Params& params, stage::Run& run) {
     TOILE_TRY(const mesh::GarmentMesh garment, run.garment("garment"));
-    TOILE_TRY(tailor::Sewn sewn, tailor::sew(garment, params));
+    TOILE_TRY(const tailor::SewParams plain, tailor::expand_pleats(garment, params));
+    TOILE_TRY(tailor::Sewn sewn, tailor::sew(garment, plain));
     TOILE_TRY(tailor::Folded folded, tailor::add_folds(sewn.garment, params.folds));
-    TOILE_TRY(tailor::Trimmed trimmed, tailor::add_trims(folded.garment, params.trims));
+    TOILE_TRY(const tailor::Trimmed finished, tailor::finish_seams(folded.garment, params.seams));
+    TOILE_TRY(tailor::Trimmed trimmed, tailor::add_trims(finished.garment, params.trims));
+    trimmed.trims.insert(trimmed.trims.begin(), finished.trims.begin(), finished.trims.end());
     sewn.garment = std::move(trimmed.garment);
     const tailor::SurfaceReport surface = tailor::surface_report(sewn.garment);
     run.report("seams", sewn.seams.size());

@@ -29,15 +29,15 @@ mesh::GarmentMesh pair() {
   return sewn->garment;
 }
 
-tailor::SeamFinish finish() {
-  tailor::SeamFinish seam;
+tailor::SeamSpec finish() {
+  tailor::SeamSpec seam;
   seam.name = "side";
   seam.a = {"a.right"};
   seam.b = {"-b.left"};
   return seam;
 }
 
-tailor::Trimmed finished(const mesh::GarmentMesh& g, const std::vector<tailor::SeamFinish>& seams) {
+tailor::Trimmed finished(const mesh::GarmentMesh& g, const std::vector<tailor::SeamSpec>& seams) {
   auto result = tailor::finish_seams(g, seams);
   EXPECT_TRUE(result) << (result ? "" : to_string(result.issues().front()));
   if (!result) return {};
@@ -191,12 +191,12 @@ TEST(trim, a_dart_keeps_the_cloth_between_its_legs) {
   for (std::size_t k = 0; k < 2; ++k) {
     const int run = static_cast<int>(g.runs.size());
     g.runs.push_back({.id = run, .panel = 0, .name = k == 0 ? "leg_a" : "leg_b", .length = std::hypot(0.01, 0.04), .internal = true});
-    for (int v : legs[k]) g.run_vertices.push_back({run, v, 0.02 * (6 - g.uv(v, 1) * 100)});
+    for (int v : legs[k]) g.run_vertices.push_back({run, v, std::hypot(0.01, 0.04) * (6 - g.uv(v, 1) * 100) / 4});
   }
   g.uv.row(4 * 9 + 5) << 0.045, 0.04;
   g.uv.row(4 * 9 + 3) << 0.035, 0.04;
   g.seams = {{.id = 0, .name = "dart"}};
-  tailor::SeamFinish seam;
+  tailor::SeamSpec seam;
   seam.name = seam.kind = "dart";
   seam.a = {"p.leg_a"};
   seam.b = {"p.leg_b"};
@@ -260,6 +260,7 @@ TEST(trim, what_cannot_be_done) {
   EXPECT_EQ(first_code(tailor::finish_seams(g, {seam})), "untaped");
   seam = finish();
   seam.name = "other";
+  seam.angle = 1;
   EXPECT_EQ(first_code(tailor::finish_seams(g, {seam})), "unknown_seam");
   auto bare = g;
   for (auto& run : bare.runs) run.allowance = 0;

@@ -364,24 +364,26 @@ Result<Folded> add_folds(const GarmentMesh& garment, const std::vector<FoldSpec>
     fold.factor = spec->factor;
     FoldReport report{spec->name, fold.angle, fold.radius * std::abs(fold.angle)};
     for (const std::string& text : spec->line) {
-      const auto part = find_line(garment, text);
-      if (!part) {
-        for (Issue issue : part.issues()) {
+      const auto parts = find_line(garment, text);
+      if (!parts) {
+        for (Issue issue : parts.issues()) {
           issue.place.item = item;
           issues.push_back(std::move(issue));
         }
         continue;
       }
-      const mesh::Run& run = garment.runs[static_cast<std::size_t>(part->run)];
-      auto found = folder.hinges({text, run.panel, run.internal, part->vertices}, fold, item);
-      if (!found) {
-        append(issues, found.issues());
-        continue;
+      for (const LinePart& part : *parts) {
+        const mesh::Run& run = garment.runs[static_cast<std::size_t>(part.run)];
+        auto found = folder.hinges({text, run.panel, run.internal, part.vertices}, fold, item);
+        if (!found) {
+          append(issues, found.issues());
+          continue;
+        }
+        if (part.whole) fold.runs.push_back(part.run);
+        for (std::size_t k = 1; k < part.vertices.size(); ++k) report.length += (garment.uv.row(part.vertices[k]) - garment.uv.row(part.vertices[k - 1])).norm();
+        report.hinges += static_cast<int>(found->size());
+        hinges.insert(hinges.end(), found->begin(), found->end());
       }
-      if (part->whole) fold.runs.push_back(part->run);
-      for (std::size_t k = 1; k < part->vertices.size(); ++k) report.length += (garment.uv.row(part->vertices[k]) - garment.uv.row(part->vertices[k - 1])).norm();
-      report.hinges += static_cast<int>(found->size());
-      hinges.insert(hinges.end(), found->begin(), found->end());
     }
     result.garment.folds.push_back(std::move(fold));
     result.folds.push_back(std::move(report));

@@ -57,7 +57,9 @@ Result<Sewn> sew(const GarmentMesh& garment, const SewParams& params) {
   Issues issues;
   if (!garment.vertex_columns.empty() || !garment.face_columns.empty()) issues.push_back({"unsupported_columns", {}, "the garment has columns of later stages", "sew before the stages that add them"});
   if (!garment.laminates.empty()) issues.push_back({"already_layered", {}, "the garment has layers already", "sew before toile-layer"});
-  if (!garment.hinges.empty() || !garment.trim_segments.empty()) issues.push_back({"already_folded", {}, "the garment has folds or trims already", "sew first, or in the same spec"});
+  // Folds that know their lines (pleats) get new hinges below.
+  const bool lasting = std::any_of(garment.hinges.begin(), garment.hinges.end(), [&](const mesh::Hinge& h) { return h.fold < 0 || garment.folds[static_cast<std::size_t>(h.fold)].runs.empty(); });
+  if (lasting || !garment.trim_segments.empty()) issues.push_back({"already_folded", {}, "the garment has folds or trims already", "sew first, or in the same spec"});
   if (!garment.welds.empty()) issues.push_back({"already_sewn", {}, "the garment is sewn already", "list all seams in one spec"});
   std::vector<Eigen::Vector3d> offset(garment.panels.size());
   std::vector<char> known(garment.panels.size(), 0);
@@ -127,6 +129,8 @@ Result<Sewn> sew(const GarmentMesh& garment, const SewParams& params) {
     sewn.seams.push_back({id, bond.report.name, bond.side == 1 ? spec.kind : "further", bond.report.length_a, bond.report.length_b, spec.bending_factor.value_or(params.bending_factor)});
   }
   result.garment = std::move(sewn);
+  // Folds that the panels came with: their hinges are on other triangles now.
+  TOILE_TRY(result.garment.hinges, fold_hinges(result.garment));
   issues = check_surface(result.garment);
   if (!issues.empty()) return issues;
   return result;

@@ -202,7 +202,7 @@ void SewingTable::open_tip(int vertex) {
 }
 
 void SewingTable::part_plies(const std::vector<std::array<int, 2>>& welds) {
-  // Particles of sewn vertices only.
+  // Particles of sewn vertices; others stand for themselves.
   std::map<int, int> root;
   const auto find = [&](int v) {
     int r = v;
@@ -216,15 +216,24 @@ void SewingTable::part_plies(const std::vector<std::array<int, 2>>& welds) {
     const int p = find(a), q = find(b);
     root.at(std::max(p, q)) = std::min(p, q);
   }
+  const auto on_inner_line = [&](const Triple& t) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (mesh_.constraints.count(std::minmax(t[k], t[(k + 1) % 3]))) return true;
+    }
+    return false;
+  };
   std::map<Triple, int> seen;
   std::vector<int> doubled;
   for (std::size_t t = 0; t < mesh_.triangles.size(); ++t) {
     Triple key = mesh_.triangles[t];
-    if (key[0] < 0 || !std::all_of(key.begin(), key.end(), [&](int v) { return root.count(v) > 0; })) continue;
-    for (int& v : key) v = find(v);
+    if (key[0] < 0 || std::count_if(key.begin(), key.end(), [&](int v) { return root.count(v) > 0; }) < 2) continue;
+    for (int& v : key) v = root.count(v) > 0 ? find(v) : v;
     std::sort(key.begin(), key.end());
     const auto [twin, fresh] = seen.emplace(key, static_cast<int>(t));
-    if (!fresh && panel_[mesh_.triangles[t][0]] != panel_[mesh_.triangles[static_cast<std::size_t>(twin->second)][0]]) doubled.push_back(static_cast<int>(t));
+    if (fresh) continue;
+    const Triple &first = mesh_.triangles[static_cast<std::size_t>(twin->second)], &second = mesh_.triangles[t];
+    // In one panel only the two sides of a fold lie on each other; anything else is a seam that should not be.
+    if (panel_[second[0]] != panel_[first[0]] || (on_inner_line(first) && on_inner_line(second))) doubled.push_back(static_cast<int>(t));
   }
   for (int t : doubled) {
     const Triple v = mesh_.triangles[static_cast<std::size_t>(t)];

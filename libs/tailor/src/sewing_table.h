@@ -30,7 +30,8 @@ class SewingTable {
   void open_tip(int vertex);
 
   /// Where several panels are sewn along two sides of a corner, a triangle whose corners are all on the seams would lie on one
-  /// of another panel: it is cut by a vertex inside the panel.
+  /// of another panel: it is cut by a vertex inside the panel. So is one that a fold lays on its neighbour, in a seam that
+  /// holds a pleat.
   /// welds  pairs of vertices that are the same particle
   void part_plies(const std::vector<std::array<int, 2>>& welds);
 

@@ -5,6 +5,7 @@
 #include "toile/base/text.h"
 #include "toile/tailor/fold.h"
 #include "toile/tailor/quality.h"
+#include "toile/tailor/sew.h"
 
 #include <algorithm>
 #include <cmath>
@@ -20,12 +21,12 @@ using mesh::GarmentMesh;
 std::vector<LinePart> find_lines(const GarmentMesh& garment, const std::vector<std::string>& texts, const std::string& item, Issues& issues) {
   std::vector<LinePart> parts;
   for (const std::string& text : texts) {
-    auto part = find_line(garment, text);
-    if (part) {
-      parts.push_back(std::move(*part));
+    auto found = find_line(garment, text);
+    if (found) {
+      parts.insert(parts.end(), found->begin(), found->end());
       continue;
     }
-    for (Issue issue : part.issues()) {
+    for (Issue issue : found.issues()) {
       issue.place.item = item;
       issues.push_back(std::move(issue));
     }
@@ -106,18 +107,11 @@ std::string line_name(const GarmentMesh& garment, int run) {
   return garment.panels[static_cast<std::size_t>(row.panel)].name + "." + row.name;
 }
 
-/// Sheets of each side's cloth that lie along the seam besides the panels themselves.
-std::array<int, 2> plies_of(Allowance allowance) {
-  if (allowance == Allowance::none) return {0, 0};
-  return allowance == Allowance::felled ? std::array{2, 1} : std::array{1, 1};
-}
-
-void lay_allowances(Haberdasher& shop, const SeamFinish& seam, int id, const std::array<std::vector<LinePart>, 2>& sides) {
+void lay_allowances(Haberdasher& shop, const SeamSpec& seam, int id, const std::vector<std::vector<LinePart>>& sides) {
   const Allowance allowance = seam.allowance.value_or(seam.kind == "felled" ? Allowance::felled : Allowance::none);
-  const std::array<int, 2> plies = plies_of(allowance);
+  if (allowance == Allowance::none) return;
   const GarmentMesh& garment = shop.garment();
-  for (std::size_t side = 0; side < 2; ++side) {
-    if (plies[side] == 0) continue;
+  for (std::size_t side = 0; side < sides.size(); ++side) {
     std::map<int, int> uses;
     for (const LinePart& part : sides[side]) {
       const mesh::Run& run = garment.runs[static_cast<std::size_t>(part.run)];
@@ -135,7 +129,7 @@ void lay_allowances(Haberdasher& shop, const SeamFinish& seam, int id, const std
       trim.kind = "allowance";
       trim.seam = id;
       trim.width = width;
-      trim.plies = plies[side];
+      trim.plies = allowance == Allowance::felled && side == 0 ? 2 : 1;
       shop.lay(std::move(trim), {part});
     }
   }
@@ -163,20 +157,32 @@ double bending_along(const fabric::Card& card, const Eigen::Vector2d& direction)
 
 }  // namespace
 
-Result<Trimmed> finish_seams(const GarmentMesh& garment, const std::vector<SeamFinish>& seams) {
+Result<Trimmed> finish_seams(const GarmentMesh& garment, const std::vector<SeamSpec>& seams) {
   Haberdasher shop(garment);
-  std::vector<const SeamFinish*> order;
-  for (const SeamFinish& seam : seams) order.push_back(&seam);
-  std::sort(order.begin(), order.end(), [](const SeamFinish* a, const SeamFinish* b) { return a->name < b->name; });
-  for (const SeamFinish* seam : order) {
+  std::vector<const SeamSpec*> order;
+  for (const SeamSpec& seam : seams) {
+    const bool allowance = seam.allowance ? *seam.allowance != Allowance::none : seam.kind == "felled";
+    if (seam.tape || seam.thread || seam.elastic || seam.angle || allowance || seam.kind == "taped") order.push_back(&seam);
+  }
+  std::sort(order.begin(), order.end(), [](const SeamSpec* a, const SeamSpec* b) { return a->name < b->name; });
+  for (const SeamSpec* seam : order) {
     const std::string item = "seam " + seam->name;
-    if (seam->kind == "taped" && !seam->tape) shop.issues().push_back({"untaped", {.item = item}, "it is taped, but with what is not said", "give `tape` with its width, B, stretch and mass"});
-    const auto row = std::find_if(garment.seams.begin(), garment.seams.end(), [&](const mesh::Seam& s) { return s.name == seam->name; });
+    const auto complain = [&](Issue issue) {
+      issue.place.item = item;
+      shop.issues().push_back(std::move(issue));
+    };
+    if (seam->kind == "taped" && !seam->tape) complain({"untaped", {}, "it is taped, but with what is not said", "give `tape` with its width, B, stretch and mass"});
+    if (seam->pleated && seam->angle) complain({"angle_with_pleats", {}, "an angle is given for a seam that holds pleats", "leave it out: the layers in such a seam have no one angle"});
+    // A pleated seam has a row for each of its stretches; its trims go with the first.
+    const std::string row_name = seam->pleated ? seam->name + "_1" : seam->name;
+    const auto row = std::find_if(garment.seams.begin(), garment.seams.end(), [&](const mesh::Seam& s) { return s.name == row_name; });
     if (row == garment.seams.end()) {
-      shop.issues().push_back({"unknown_seam", {.item = item}, "the garment has no such seam", "sew it first"});
+      complain({"unknown_seam", {}, "the garment has no such seam", "sew it first"});
       continue;
     }
-    const std::array sides{find_lines(garment, seam->a, item, shop.issues()), find_lines(garment, seam->b, item, shop.issues())};
+    std::vector<std::vector<LinePart>> sides{find_lines(garment, seam->a, item, shop.issues()), find_lines(garment, seam->b, item, shop.issues())};
+    for (const auto& side : seam->more) sides.push_back(find_lines(garment, side, item, shop.issues()));
+    const std::vector<LinePart>& line = seam->pleated && length_of(garment, sides[1]) < length_of(garment, sides[0]) ? sides[1] : sides[0];
     if (seam->tape) {
       mesh::Trim trim;
       trim.name = seam->name + " tape";
@@ -187,26 +193,21 @@ Result<Trimmed> finish_seams(const GarmentMesh& garment, const std::vector<SeamF
       trim.linear_density = seam->tape->mass;
       trim.rest_ratio = seam->tape->ratio;
       trim.width = seam->tape->width;
-      shop.lay(std::move(trim), sides[0]);
+      shop.lay(std::move(trim), line);
     }
-    if (seam->thread) shop.lay(thread_of(*seam->thread, seam->name + " thread", "thread", row->id), sides[0]);
-    if (seam->elastic) shop.lay(thread_of(*seam->elastic, seam->name + " elastic", "elastic", row->id), sides[0]);
+    if (seam->thread) shop.lay(thread_of(*seam->thread, seam->name + " thread", "thread", row->id), line);
+    if (seam->elastic) shop.lay(thread_of(*seam->elastic, seam->name + " elastic", "elastic", row->id), line);
     lay_allowances(shop, *seam, row->id, sides);
-    if (seam->angle) {
-      std::vector<std::vector<int>> a;
-      for (const LinePart& part : sides[0]) a.push_back(part.vertices);
-      std::vector<int> b;
-      for (const LinePart& part : sides[1]) b.insert(b.end(), part.vertices.begin(), part.vertices.end());
-      if (a.empty() || b.empty()) continue;
-      const auto hinges = seam_hinges(garment, a, b, *seam->angle, row->bending_factor);
-      if (hinges) {
-        shop.garment().hinges.insert(shop.garment().hinges.end(), hinges->begin(), hinges->end());
-      } else {
-        for (Issue issue : hinges.issues()) {
-          issue.place.item = item;
-          shop.issues().push_back(std::move(issue));
-        }
-      }
+    if (!seam->angle || seam->pleated || sides[0].empty() || sides[1].empty()) continue;
+    std::vector<std::vector<int>> a;
+    for (const LinePart& part : sides[0]) a.push_back(part.vertices);
+    std::vector<int> b;
+    for (const LinePart& part : sides[1]) b.insert(b.end(), part.vertices.begin(), part.vertices.end());
+    const auto hinges = seam_hinges(garment, a, b, *seam->angle, row->bending_factor);
+    if (hinges) {
+      shop.garment().hinges.insert(shop.garment().hinges.end(), hinges->begin(), hinges->end());
+    } else {
+      for (const Issue& issue : hinges.issues()) complain(issue);
     }
   }
   return std::move(shop).done();
@@ -222,11 +223,11 @@ Result<Trimmed> add_trims(const GarmentMesh& garment, const std::vector<TrimSpec
     const std::string item = "trim " + spec->name;
     if (spec->along.empty()) shop.issues().push_back({"no_line", {.item = item}, "it runs along no line", "name at least one: panel.line"});
     const std::vector<LinePart> parts = find_lines(garment, spec->along, item, shop.issues());
-    if (parts.size() != spec->along.size()) continue;
+    if (parts.size() < spec->along.size()) continue;
     for (std::size_t k = 1; k < parts.size(); ++k) {
       const int end = parts[k - 1].vertices.back(), start = parts[k].vertices.front();
       if (particle[end] == particle[start]) continue;
-      shop.issues().push_back({"broken_chain", {.item = item}, fmt::format("'{}' ends at panel {}, '{}' begins at panel {}: these are not sewn together", spec->along[k - 1], place_text(garment, end), spec->along[k], place_text(garment, start)),
+      shop.issues().push_back({"broken_chain", {.item = item}, fmt::format("'{}' ends at panel {}, '{}' begins at panel {}: these are not sewn together", line_name(garment, parts[k - 1].run), place_text(garment, end), line_name(garment, parts[k].run), place_text(garment, start)),
                                "put '-' before lines that run the other way, correct their order, or sew the panels", Category::check});
     }
     static constexpr std::array kinds{"tape", "elastic", "drawstring"};

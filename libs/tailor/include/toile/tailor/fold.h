@@ -21,7 +21,7 @@ struct FoldSpec {
   double factor = 1;
   static void describe(auto& f) {
     f(&FoldSpec::name, {.key = "name", .doc = "unique name", .required = true});
-    f(&FoldSpec::line, {.key = "line", .doc = "lines that it runs along: panel.line, named in the `lines` of toile-mesh, or sewn edges", .required = true});
+    f(&FoldSpec::line, {.key = "line", .doc = "lines that it runs along: panel.line, named in the `lines` of toile-mesh, panel.line(from..to), or sewn edges", .required = true});
     f(&FoldSpec::kind, {.key = "kind", .doc = "crease, roll, hem, lapel, ... (free text, kept in the garment)"});
     f(&FoldSpec::angle, {.key = "angle", .doc = "angle that is pressed; positive: towards the face side (a valley seen from it)", .unit = "rad", .min = -3.1415926535897931, .max = 3.1415926535897931, .required = true});
     f(&FoldSpec::radius, {.key = "radius", .doc = "the angle is rolled over an arc of this radius; 0: a sharp crease", .unit = "m", .min = 0, .max = 1});
@@ -45,7 +45,7 @@ struct Folded {
 
 /// Adds folds and their hinges to a garment, in the order of their names.
 /// garment  flat panels, sewn or not
-/// error    "duplicate_name", "no_line", "bad_reference", "unknown_panel", "unknown_line", "unknown_point", "bad_range",
+/// error    "duplicate_name", "no_line", "bad_reference", "unknown_panel", "unknown_line", "unknown_point", "bad_range", "no_vertex",
 ///          "free_border", "branching_fold", "roll_on_border", "narrow_roll", "flat_fold"
 Result<Folded> add_folds(const mesh::GarmentMesh& garment, const std::vector<FoldSpec>& folds);
 

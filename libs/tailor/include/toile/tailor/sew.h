@@ -43,7 +43,13 @@ struct SeamSpec {
   std::vector<EaseZone> ease_at;
   std::vector<MatchPoint> match;
   bool same_direction = false;
+  bool pleated = false;
   std::optional<double> bending_factor;
+  std::optional<double> angle;
+  std::optional<SeamTape> tape;
+  std::optional<SeamThread> thread, elastic;
+  std::optional<Allowance> allowance;
+  std::optional<double> allowance_width;
   static void describe(auto& f) {
     f(&SeamSpec::name, {.key = "name", .doc = "unique name", .required = true});
     f(&SeamSpec::a, {.key = "a", .doc = "edges of the first side in sewing order: panel.edge, or a part of it, panel.edge(from..to), between named points, lengths (120 mm, negative: before the end) or percentages (25 %); '-' before one runs it backwards", .required = true});
@@ -55,7 +61,14 @@ struct SeamSpec {
     f(&SeamSpec::ease_at, {.key = "ease_at", .doc = "where along a side the difference is laid; otherwise evenly between match points"});
     f(&SeamSpec::match, {.key = "match", .doc = "places of the sides that come together"});
     f(&SeamSpec::same_direction, {.key = "same_direction", .doc = "the face of one cloth meets the back of the other: both sides run the same way round their panels"});
+    f(&SeamSpec::pleated, {.key = "pleated", .doc = "one side lies in its pleats: the hidden cloth is caught in the seam, pleats are stitched down as far as their lines go"});
     f(&SeamSpec::bending_factor, {.key = "bending_factor", .doc = "bending stiffness along the seam over the cloth's", .unit = "1", .min = 0.1, .max = 1000});
+    f(&SeamSpec::angle, {.key = "angle", .doc = "angle at rest between sides a and b; positive: towards the face side", .unit = "rad", .min = -3.14, .max = 3.14});
+    f(&SeamSpec::tape, {.key = "tape", .doc = "a tape sewn into the seam"});
+    f(&SeamSpec::thread, {.key = "thread", .doc = "the thread of the seam, where it is tighter or looser than the cloth"});
+    f(&SeamSpec::elastic, {.key = "elastic", .doc = "an elastic sewn into the seam"});
+    f(&SeamSpec::allowance, {.key = "allowance", .doc = "how the allowances lie: none, open (pressed apart), to_a, to_b, felled (what a seam of kind felled has); they weigh and stiffen the seam"});
+    f(&SeamSpec::allowance_width, {.key = "allowance_width", .doc = "their width, or that of the fell; without it what the pattern says, of darts the cloth between the legs", .unit = "m", .min = 0, .max = 0.5});
     f.check([](const SeamSpec& seam, Issues& issues) {
       if (seam.ease && seam.gather) issues.push_back({"ease_and_gather", {.item = "gather"}, "ease and gather are both given", "ease says the difference of the lengths, gather their ratio: keep one"});
     });

@@ -76,18 +76,6 @@ enum class Allowance {
   felled,  ///< the first one folded over the second and stitched down
 };
 
-/// What is sewn along a seam, and the angle at which it is pressed.
-struct SeamFinish {
-  std::string name;
-  std::string kind = "plain";
-  std::vector<std::string> a, b;  ///< edges of the two sides as the seam's spec names them
-  std::optional<double> angle;    ///< [rad]
-  std::optional<SeamTape> tape;
-  std::optional<SeamThread> thread, elastic;
-  std::optional<Allowance> allowance;
-  std::optional<double> allowance_width;  ///< [m]
-};
-
 struct TrimReport {
   std::string name, kind;
   double length = 0;  ///< of the cloth under it [m]
@@ -99,10 +87,15 @@ struct Trimmed {
   std::vector<TrimReport> trims;
 };
 
-/// Adds the trims and hinges of seams, in the order of the seams' names. Seams without any are left as they are.
-/// garment  sewn, with a row in `seams` for each finish
-/// error    "unknown_seam", "untaped", "no_allowance", "duplicate_name", "angle_without_border", and those of references
-Result<Trimmed> finish_seams(const mesh::GarmentMesh& garment, const std::vector<SeamFinish>& seams);
+struct SeamSpec;
+
+/// Adds the tapes, threads, elastics and allowances that seams ask for, and hinges where they ask for an angle, in the order of
+/// the seams' names. Seams that ask for nothing are left as they are. Tapes, threads and elastics lie on side a (of a pleated
+/// seam on the side without pleats).
+/// garment  sewn by these specs
+/// error    "unknown_seam", "untaped", "no_allowance", "duplicate_name", "angle_without_border", "angle_with_pleats", and
+///          those of references
+Result<Trimmed> finish_seams(const mesh::GarmentMesh& garment, const std::vector<SeamSpec>& seams);
 
 /// Adds trims along chains of edges and inner lines, in the order of their names. Each line must begin in the particle where
 /// the one before ends.
