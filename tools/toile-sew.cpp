@@ -4,6 +4,7 @@
 #include "toile/tailor/quality.h"
 #include "toile/tailor/sew.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -16,7 +17,7 @@ struct SewStage {
 
   static stage::Description description() {
     return {.name = "toile-sew",
-            .version = 2,
+            .version = 3,
             .summary = "Sews panels along named edges: border particles of the two sides become the same particle.",
             .example = "toile-sew panels.ply -o sewn.ply --spec pipelines/tee/seams.yaml",
             .details = "A side of a seam is a chain of edges in sewing order: panel.edge, or a part of it, panel.edge(from..to), between named "
@@ -29,6 +30,9 @@ struct SewStage {
             .inputs = {{.name = "garment", .doc = "flat panels from toile-mesh", .kind = stage::FileKind::garment}},
             .output = stage::FileKind::garment};
   }
+
+  /// Seams are carried out in the order of their names, and recorded so: a shuffled spec gives the same file.
+  static void normalize(Params& params) { std::ranges::stable_sort(params.seams, {}, &tailor::SeamSpec::name); }
 
   static Result<stage::Output> run(const Params& params, stage::Run& run) {
     TOILE_TRY(const mesh::GarmentMesh garment, run.garment("garment"));

@@ -2,6 +2,9 @@
 // drafts, topology of the sewn shell, the same file whatever the order of the seams.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
 #include <map>
 #include <string>
 
@@ -113,6 +116,25 @@ TEST(jacket, ease_of_the_caps_lies_at_their_top_on_both_sides) {
 
 TEST(jacket, seams_in_any_order_give_the_same_bytes) {
   expect_same_bytes_in_any_order(panels_of("jacket", 0.025), seams_of("jacket"));
+}
+
+TEST(jacket, a_shuffled_spec_gives_the_same_file) {
+  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "toile_shuffled_jacket";
+  std::filesystem::create_directories(folder);
+  const std::string panels = (folder / "panels.ply").string();
+  ASSERT_TRUE(io::write_file(panels, io::format_garment(panels_of("jacket", 0.025), io::Encoding::binary)).empty());
+  auto params = seams_of("jacket");
+  std::vector<std::string> files;
+  for (const char* name : {"listed", "reversed"}) {
+    const std::string spec = (folder / (std::string(name) + ".yaml")).string(), out = (folder / (std::string(name) + ".ply")).string();
+    ASSERT_TRUE(io::write_file(spec, io::block_yaml(*record_type<tailor::SewParams>(), &params)).empty());
+    const std::string command = std::string(TOILE_BIN_DIR) + "/toile-sew " + panels + " -o " + out + " --quiet --spec " + spec + " 2> /dev/null";
+    ASSERT_EQ(std::system(command.c_str()), 0);
+    files.push_back(checked(io::read_file(out)));
+    std::reverse(params.seams.begin(), params.seams.end());
+  }
+  EXPECT_EQ(files[0], files[1]);
+  std::filesystem::remove_all(folder);
 }
 
 TEST(jacket, lapels_and_collar_are_folded_towards_their_face) {

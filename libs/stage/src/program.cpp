@@ -311,6 +311,7 @@ class Program {
     }
 
     catch_signals();
+    if (entry_.normalize) entry_.normalize(params.get());
     Result<Output> result = entry_.run(params.get(), run);
     if (!result) return fail(result.issues(), options.json);
     Output& output = *result;

@@ -121,6 +121,7 @@ struct Entry {
   std::shared_ptr<const RecordType> params;
   std::function<std::shared_ptr<void>()> make_params;
   std::function<Result<Output>(const void* params, Run&)> run;
+  std::function<void(void* params)> normalize;  ///< of specs that mean the same one is run and recorded; may be empty
 };
 
 int run_program(const Entry& entry, int argc, char** argv);
@@ -135,8 +136,12 @@ std::string docs_page(const Entry& entry);
 template <class Stage>
 Entry entry() {
   using Params = typename Stage::Params;
-  return Entry{Stage::description(), record_type<Params>(), [] { return std::make_shared<Params>(); },
-               [](const void* params, Run& run) { return Stage::run(*static_cast<const Params*>(params), run); }};
+  Entry entry{Stage::description(), record_type<Params>(), [] { return std::make_shared<Params>(); },
+              [](const void* params, Run& run) { return Stage::run(*static_cast<const Params*>(params), run); }, {}};
+  if constexpr (requires(Params& params) { Stage::normalize(params); }) {
+    entry.normalize = [](void* params) { Stage::normalize(*static_cast<Params*>(params)); };
+  }
+  return entry;
 }
 
 template <class Stage>
