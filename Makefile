@@ -1,6 +1,6 @@
 # The front door. `make help` lists what there is; CMake does the work in build/release.
 .DEFAULT_GOAL := help
-.PHONY: help deps configure tools tee skirt jacket test bench docs asan ubsan clean
+.PHONY: help deps configure tools tee skirt jacket waistcoat test bench docs asan ubsan clean
 BUILD := build/release
 JOBS ?= $(shell nproc)
 
@@ -8,6 +8,7 @@ help:
 	@echo 'make tee      install what is missing, build, and make a T-shirt: pattern -> garment at rest on a dress form'
 	@echo 'make skirt    the same for a skirt with darts'
 	@echo 'make jacket   a man'"'"'s jacket, from pattern to sewn and layered shell, and a dress form (not yet put on it)'
+	@echo 'make waistcoat   the same of a waistcoat'
 	@echo 'make test     build and run all tests'
 	@echo 'make bench    time the tee stage by stage, and reading and writing of large garments'
 	@echo 'make docs     write docs/stages/ from the programs'
@@ -23,7 +24,7 @@ configure: deps
 tools: configure
 	@cmake --build $(BUILD) --target tools -j $(JOBS)
 
-tee skirt jacket: tools
+tee skirt jacket waistcoat: tools
 	@$(BUILD)/bin/toile run pipelines/$@/pipeline.yaml --build build/garments -j $(JOBS)
 
 test: configure

@@ -145,3 +145,24 @@ TEST(jacket, lapels_and_collar_are_folded_towards_their_face) {
   for (const auto& fold : folded.folds) EXPECT_GT(fold.angle, 2.5) << fold.name;
   EXPECT_TRUE(mesh::validate(folded.garment).empty());
 }
+
+TEST(waistcoat, shell_is_one_piece_with_three_openings_and_the_drafted_lengths) {
+  const auto flat = panels_of("waistcoat", 0.02);
+  EXPECT_EQ(flat.panels.size(), 4u);
+  const auto sewn = checked(tailor::sew(flat, seams_of("waistcoat")));
+  expect_lengths(sewn.garment, {{"dart_front_left", {308.97, 308.97}},
+                                {"dart_front_right", {308.97, 308.97}},
+                                {"dart_back_left", {296.99, 296.99}},
+                                {"dart_back_right", {296.99, 296.99}},
+                                {"side_left", {333.37, 333.08}},
+                                {"side_right", {333.08, 333.37}},
+                                {"shoulder_left", {116.09, 116.09}},
+                                {"shoulder_right", {116.09, 116.09}},
+                                {"centre_back", {576.71, 576.71}}});
+  // Hem, fronts and neck are one border; the armholes are the others.
+  expect_surface(sewn.garment, {2434, 515, 515});
+}
+
+TEST(waistcoat, seams_in_any_order_give_the_same_bytes) {
+  expect_same_bytes_in_any_order(panels_of("waistcoat", 0.02), seams_of("waistcoat"));
+}
