@@ -79,28 +79,30 @@ Side side_of(const GarmentMesh& garment, Issues& issues, const std::vector<std::
   Side side;
   bool mixed = false;
   for (const std::string& text : chain) {
-    const auto line = find_line(garment, text);
-    if (!line) {
-      Issue issue = line.issues().front();
+    const auto parts = find_line(garment, text);
+    if (!parts) {
+      Issue issue = parts.issues().front();
       issue.place.item = item;
       issues.push_back(issue);
       continue;
     }
-    if (line->vertices.front() == line->vertices.back()) {
-      issues.push_back({"bad_zip", {.item = item}, fmt::format("'{}' closes round: a zip has two ends", text), "name a stretch of it: panel.line(from..to)"});
-      continue;
+    for (const LinePart& line : *parts) {
+      if (line.vertices.front() == line.vertices.back()) {
+        issues.push_back({"bad_zip", {.item = item}, fmt::format("'{}' closes round: a zip has two ends", text), "name a stretch of it: panel.line(from..to)"});
+        continue;
+      }
+      std::map<int, double> s_of;
+      for (const auto& row : garment.run_vertices) {
+        if (row.run == line.run) s_of[row.vertex] = row.s;
+      }
+      const int sense = sense_of(garment, garment.runs[static_cast<std::size_t>(line.run)].panel, line.vertices[0], line.vertices[1]);
+      if (sense != 0 && side.sense != 0 && sense != side.sense) mixed = true;
+      if (sense != 0) side.sense = sense;
+      // Where one edge ends and the next begins there is one place.
+      const double start = s_of[line.vertices.front()];
+      for (std::size_t k = side.nodes.empty() ? 0 : 1; k < line.vertices.size(); ++k) side.nodes.push_back({side.length + std::abs(s_of[line.vertices[k]] - start), line.vertices[k]});
+      side.length = side.nodes.back().s;
     }
-    std::map<int, double> s_of;
-    for (const auto& row : garment.run_vertices) {
-      if (row.run == line->run) s_of[row.vertex] = row.s;
-    }
-    const int sense = sense_of(garment, garment.runs[static_cast<std::size_t>(line->run)].panel, line->vertices[0], line->vertices[1]);
-    if (sense != 0 && side.sense != 0 && sense != side.sense) mixed = true;
-    if (sense != 0) side.sense = sense;
-    // Where one edge ends and the next begins there is one place.
-    const double start = s_of[line->vertices.front()];
-    for (std::size_t k = side.nodes.empty() ? 0 : 1; k < line->vertices.size(); ++k) side.nodes.push_back({side.length + std::abs(s_of[line->vertices[k]] - start), line->vertices[k]});
-    side.length = side.nodes.back().s;
   }
   if (mixed) issues.push_back({"bad_zip", {.item = item}, "one of its edges runs against the others of its side", "put '-' before it, or take it away"});
   return side;

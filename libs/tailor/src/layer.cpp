@@ -161,13 +161,12 @@ class Layering {
 
   /// A line of a panel, or a stretch of one, as a row of vertices. In a mirrored copy edges run the other way.
   Result<std::vector<int>> line_of(const std::string& panel, const std::string& name) const {
-    auto part = find_line(result_.garment, panel + "." + name);
+    auto row = find_row(result_.garment, panel + "." + name);
     const auto open = name.find('('), dots = name.find("..");
-    if (!part && part.issues().front().code == "bad_range" && open < dots) {
-      part = find_line(result_.garment, fmt::format("{}.{}({}..{})", panel, name.substr(0, open), name.substr(dots + 2, name.size() - dots - 3), name.substr(open + 1, dots - open - 1)));
+    if (!row && row.issues().front().code == "bad_range" && open < dots) {
+      row = find_row(result_.garment, fmt::format("{}.{}({}..{})", panel, name.substr(0, open), name.substr(dots + 2, name.size() - dots - 3), name.substr(open + 1, dots - open - 1)));
     }
-    if (!part) return part.issues();
-    return std::move(part->vertices);
+    return row;
   }
 
   /// Faces of one panel that a layer covers.

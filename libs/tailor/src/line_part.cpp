@@ -25,4 +25,14 @@ Result<std::vector<LinePart>> find_line(const mesh::GarmentMesh& garment, const 
   return result;
 }
 
+Result<std::vector<int>> find_row(const mesh::GarmentMesh& garment, const std::string& text) {
+  TOILE_TRY(const std::vector<LinePart> parts, find_line(garment, text));
+  std::vector<int> row;
+  for (const LinePart& part : parts) {
+    const bool goes_on = !row.empty() && row.back() == part.vertices.front();
+    row.insert(row.end(), part.vertices.begin() + (goes_on ? 1 : 0), part.vertices.end());
+  }
+  return row;
+}
+
 }  // namespace toile::tailor

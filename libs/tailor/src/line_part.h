@@ -20,4 +20,7 @@ struct LinePart {
 /// error  those of find_parts(), "unknown_line" in place of "unknown_edge", "no_vertex" where a range ends between vertices
 Result<std::vector<LinePart>> find_line(const mesh::GarmentMesh& garment, const std::string& text);
 
+/// The same as one row of vertices.
+Result<std::vector<int>> find_row(const mesh::GarmentMesh& garment, const std::string& text);
+
 }  // namespace toile::tailor
