@@ -148,7 +148,10 @@ std::vector<int> part_vertices(const GarmentMesh& garment, const RunPart& part, 
     if (rows.empty() || std::abs(rows[best].s - place.s) > within) return std::nullopt;
     return best;
   };
-  const auto first = nearest(part.from), last = nearest(part.to);
+  // A whole run has all its vertices, whatever a curve's length says of its ends.
+  const bool from_start = part.from.s <= 0, to_end = part.to.s >= garment.runs[static_cast<std::size_t>(part.run)].length;
+  const auto first = from_start && !rows.empty() ? std::optional<std::size_t>(0) : nearest(part.from);
+  const auto last = to_end && !rows.empty() ? std::optional<std::size_t>(rows.size() - 1) : nearest(part.to);
   std::vector<int> ids;
   if (!first || !last || *last <= *first) return ids;
   for (std::size_t k = *first; k <= *last; ++k) ids.push_back(rows[k].vertex);
