@@ -189,18 +189,8 @@ ShearCurve shear_curve(const ShearTable& table) {
   return curve;
 }
 
-Locking used_locking(const Card& card) {
-  if (card.locking) return *card.locking;
-  Locking locking;
-  if (card.shear_table || !(card.shear_hysteresis > 0 && card.shear_hysteresis_5 > card.shear_hysteresis)) return locking;
-  // The same pressure between the yarns makes friction and stiffness grow with the shear angle; where nothing better is known
-  // the branch beyond the second angle is stiffer by as much as the friction has grown.
-  const Conditions conditions = card.conditions.value_or(Conditions{});
-  locking.angle = conditions.shear_hysteresis_5_at;
-  locking.angle_end = std::max(conditions.shear_angle_max, locking.angle);
-  locking.ratio = std::min(card.shear_hysteresis_5 / card.shear_hysteresis, 4.0);
-  return locking;
-}
+/// Stiffening is used only where a card states it: an estimate from 2HG5/2HG kept garments from coming to rest.
+Locking used_locking(const Card& card) { return card.locking.value_or(Locking{}); }
 
 ShearCurve shear_curve(const Card& card) { return card.shear_table ? shear_curve(*card.shear_table) : shear_curve(card.shear, used_locking(card)); }
 
