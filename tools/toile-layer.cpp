@@ -15,7 +15,7 @@ struct LayerStage {
 
   static stage::Description description() {
     return {.name = "toile-layer",
-            .version = 4,
+            .version = 5,
             .summary = "Gives each panel its fabric, bonds layers to panels or regions, lays free layers, sets buttons, hooks, snaps and zips.",
             .example = "toile-layer sewn.ply --fabrics samples/fabrics/shirting.yaml -o layered.ply --base shirting",
             .details = "Bonded layers act as one cloth: as parallel networks, as a laminate, or sliding on each other. A region is cut to the grid "

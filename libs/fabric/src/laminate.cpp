@@ -25,7 +25,7 @@ struct Part {
   std::array<TensileCurve, 2> tension;  ///< of its own yarns
   std::array<MomentCurve, 2> moment;
   ShearCurve shear_force;
-  std::array<double, 2> resilience, bending, bending_hysteresis, tensile_friction;
+  std::array<double, 2> resilience, bending, bending_hysteresis;
   double shear = 0, shear_hysteresis = 0, shear_hysteresis_5 = 0, twist = 0, thickness = 0;
 
   double along(Direction stack, std::size_t own) const { return share[stack == own ? 0 : 1]; }
@@ -101,8 +101,6 @@ Part part_of(const Sheet& sheet) {
     part.resilience[own] = yarn.resilience;
     part.bending[own] = yarn.bending;
     part.bending_hysteresis[own] = yarn.bending_hysteresis;
-    // A constant force whose loop to EMT and back has the area that is lost: (1 - RT) WT = 2 f EMT.
-    part.tensile_friction[own] = (1 - yarn.resilience) * yarn.linearity * card.tensile_force_max / 4;
   }
   part.card = &sheet.card;
   part.shear = card.shear;
@@ -114,12 +112,13 @@ Part part_of(const Sheet& sheet) {
   return part;
 }
 
-/// Sum over a plate of own + membrane (z - z_n)^2, and of friction |z - z_n|; z_n is the neutral axis of the membrane stiffness.
+/// Sum over a plate of own + membrane (z - z_n)^2, and of the lost part of the second term; z_n is the neutral axis of the
+/// membrane stiffness.
 struct PlateSum {
-  double stiffness = 0, friction = 0;
+  double stiffness = 0, lost = 0;
 };
-template <class Membrane, class Own, class Friction>
-PlateSum plate_sum(std::span<const Part> plate, Membrane membrane, Own own, Friction friction) {
+template <class Membrane, class Own, class Lost>
+PlateSum plate_sum(std::span<const Part> plate, Membrane membrane, Own own, Lost lost) {
   PlateSum sum;
   for (const Part& part : plate) sum.stiffness += own(part);
   if (plate.size() == 1) return sum;
@@ -133,8 +132,9 @@ PlateSum plate_sum(std::span<const Part> plate, Membrane membrane, Own own, Fric
   }
   const double neutral = moment / weight;
   for (std::size_t k = 0; k < plate.size(); ++k) {
-    sum.stiffness += membrane(plate[k]) * (z[k] - neutral) * (z[k] - neutral);
-    sum.friction += friction(plate[k]) * std::abs(z[k] - neutral);
+    const double stretching = membrane(plate[k]) * (z[k] - neutral) * (z[k] - neutral);
+    sum.stiffness += stretching;
+    sum.lost += lost(plate[k]) * stretching;
   }
   return sum;
 }
@@ -212,7 +212,7 @@ ShearTable summed_shear(std::span<const Part> parts) {
   return table;
 }
 
-YarnDirection combined(std::span<const Part> parts, std::span<const std::span<const Part>> plates, Direction direction, double force_max) {
+YarnDirection combined(std::span<const Part> parts, std::span<const std::span<const Part>> plates, Direction direction, double force_max, double curvature_read) {
   const auto pull = [&](double strain) {
     Part::Pull sum;
     for (const Part& part : parts) {
@@ -238,9 +238,10 @@ YarnDirection combined(std::span<const Part> parts, std::span<const std::span<co
   for (const Part& part : parts) result.bending_hysteresis += part.of_yarns(direction, part.bending_hysteresis);
   for (const auto& plate : plates) {
     const PlateSum sum = plate_sum(plate, [&](const Part& p) { return p.stiffness(direction); }, [&](const Part& p) { return p.bending_stiffness(direction); },
-                                   [&](const Part& p) { return p.of_yarns(direction, p.tensile_friction); });
+                                   [&](const Part& p) { return 1 - p.of_yarns(direction, p.resilience); });
     result.bending += sum.stiffness;
-    result.bending_hysteresis += 2 * sum.friction;
+    // Sheets stretched by e = K |z - z_n| lose (1 - RT) C e^2 / 2 = 2 f e on the way there and back; the loop of the moment is 2 f |z - z_n| high.
+    result.bending_hysteresis += 0.5 * sum.lost * curvature_read;
   }
   const auto sees = [&](const Part& part, std::size_t own) { return part.along(direction, own) > 0; };
   bool tension = false, moment = false;
@@ -313,8 +314,9 @@ Result<Card> stacked(std::span<const Sheet> sheets, std::span<const Bond> bonds,
   for (const auto& plate : plates) {
     twist += plate_sum(plate, [](const Part& p) { return p.shear_stiffness(); }, [](const Part& p) { return p.twist_stiffness(); }, [](const Part&) { return 0.0; }).stiffness;
   }
-  result.warp = combined(parts, plates, warp, result.tensile_force_max);
-  result.weft = combined(parts, plates, weft, result.tensile_force_max);
+  const double curvature_read = result.conditions.value_or(Conditions{}).bending_hysteresis_at;
+  result.warp = combined(parts, plates, warp, result.tensile_force_max, curvature_read);
+  result.weft = combined(parts, plates, weft, result.tensile_force_max, curvature_read);
   result.licence.reset();
   result.shear_table.reset();
   result.locking.reset();
