@@ -184,7 +184,7 @@ class Builder {
                 if (distance_to(rows_[la], p) <= same_point) where = p;
               }
             }
-            if (where) issues_.push_back({"cut_crosses", {.item = item(lb)}, fmt::format("cut out, it meets edge '{}' at {}", net_.lines[la].name, place(*where)), "cut-outs lie inside the cloth, apart from each other; draw this one as part of the outline"});
+            if (where) issues_.push_back({"cut_crosses", {.item = item(lb)}, fmt::format("cut out, it meets edge '{}' at {}", net_.lines[la].name, place(*where)), "cut-outs lie inside the cloth, apart from each other; draw this one as part of the outline", Category::check});
           }
         }
       }
