@@ -146,6 +146,14 @@ TEST_F(pipeline_runs, installed_programs_work_outside_the_repository_and_the_pac
   EXPECT_TRUE(log().starts_with("4 panels, 0.08")) << log();
 }
 
+TEST(samples, have_neither_faults_nor_doubtful_places) {
+  const std::string log = testing::TempDir() + "toile_lint.txt";
+  for (const auto& entry : fs::directory_iterator(fs::path(TOILE_SOURCE_DIR) / "samples" / "patterns")) {
+    if (entry.path().extension() != ".yaml") continue;
+    EXPECT_EQ(shell(std::string(TOILE_BIN_DIR) + "/toile-lint " + entry.path().string() + " --strict true > " + log + " 2>&1"), 0) << *io::read_file(log);
+  }
+}
+
 TEST(documentation, pages_of_programs_are_as_the_programs_print_them) {
   for (const auto& entry : fs::directory_iterator(TOILE_BIN_DIR)) {
     const std::string name = entry.path().filename();

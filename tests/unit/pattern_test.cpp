@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include <cmath>
+#include <set>
 
 #include "patterns.h"
 #include "toile/io/pattern_yaml.h"
@@ -290,6 +291,80 @@ TEST(PatternCheck, reports_everything_at_once) {
   yaml = with(yaml, "at: [50, 100]", "at: [150, 100]");
   yaml = with(yaml, "{name: shoulder,", "{name: shoulder.left,");
   EXPECT_EQ(check(parse(yaml)).size(), 3u);
+}
+
+TEST(PatternCheck, one_fault_of_an_outline_does_not_hide_the_others) {
+  // Open by 5 mm, crossed by its own side, with an edge of no length, and everything on it misplaced.
+  std::string yaml = with(half_front, "- {name: hem, path: [a, b]}\n", "- {name: hem, path: [a, b]}\n      - {name: none, path: [b, b]}\n");
+  yaml = with(yaml, "e: [0, 180]", "e: [0, 180]\n      f: [5, 180]");
+  yaml = with(yaml, "{name: centre, path: [e, a]}", "{name: centre, path: [f, a]}");
+  yaml = with(yaml, "fold: centre\n    grain: fold", "grain: [a, e]");
+  yaml = with(yaml, "[[110, 50], [80, 100]]", "[[-900, 50], [80, 100]]");
+  yaml = with(yaml, "kind: placement, path: [[0, 120], [80, 120]]", "kind: dart, path: [[10, 100], [300, 120], [10, 140]]");
+  yaml = with(yaml, "distance: 60", "distance: 6000");
+  yaml = with(yaml, "at: [50, 100]", "at: [150, 100]");
+  std::set<std::string> found;
+  for (const Issue& issue : check(parse(yaml))) found.insert(issue.code + " " + issue.place.item);
+  for (const char* expected :
+       {"zero_length_edge front.none", "open_outline front.neck", "self_crossing front.centre", "dart_outside front.chest",
+        "notch_off_border front.waist", "mark_outside front.drill"}) {
+    EXPECT_TRUE(found.count(expected)) << expected;
+  }
+  // A mark within the gap may be on the cloth once it is closed: no word about it.
+  EXPECT_FALSE(found.count("mark_outside front.button"));
+}
+
+TEST(PatternCheck, a_figure_of_eight_is_called_a_crossing) {
+  const std::string yaml =
+      "units: mm\ny: up\npieces:\n  eight:\n    grain: [a, b]\n    points: {a: [0, 0], b: [10, 0], c: [0, 8], d: [10, 8]}\n    "
+      "outline: [{name: p, path: [a, b]}, {name: q, path: [b, c]}, {name: r, path: [c, d]}, {name: s, path: [d, a]}]\n";
+  const Issues issues = check(parse(yaml));
+  ASSERT_EQ(issues.size(), 1u);
+  EXPECT_EQ(issues[0].code, "self_crossing");
+  EXPECT_NE(issues[0].what.find("(5, 4)"), std::string::npos) << issues[0].what;
+}
+
+TEST(PatternAdvice, tells_what_is_probably_not_meant) {
+  EXPECT_TRUE(advice(parse(half_front)).empty());
+  EXPECT_TRUE(advice(parse(sleeve)).empty());
+  const auto codes = [](const std::string& yaml) {
+    EXPECT_FALSE(yaml.empty());
+    EXPECT_TRUE(check(parse(yaml)).empty());
+    std::vector<std::string> result;
+    for (const Issue& issue : advice(parse(yaml))) result.push_back(issue.code + " " + issue.place.item);
+    return result;
+  };
+  using Codes = std::vector<std::string>;
+  const auto dart = [](const std::string& tip) {
+    const std::string yaml =
+        with(half_front, "- {name: hem, path: [a, b]}",
+             "- {name: hem, path: [a, p]}\n      - {name: leg_1, path: [p, t]}\n      - {name: leg_2, path: [t, q]}\n"
+             "      - {name: hem_2, path: [q, b]}");
+    return with(yaml, "pocket: [50, 100]", "p: [40, 0]\n      q: [60, 0]\n      t: " + tip);
+  };
+  EXPECT_EQ(codes(dart("[50, 60]")), Codes{});
+  EXPECT_EQ(codes(dart("[55, 60]")), Codes{"dart_legs_differ front.leg_1"});
+  EXPECT_EQ(codes(with(sleeve, "high, {curve: [[2, 20]]}, low", "high, {curve: [[8, 20]]}, low")),
+            Codes{"dart_legs_differ sleeve.dart_left"});
+  EXPECT_EQ(codes(with(half_front, "kind: placement, path: [[0, 120], [80, 120]]",
+                       "kind: dart, path: [[20, 100], [25, 60], [30, 100], [25, 150], [20, 100]]")),
+            Codes{});
+  EXPECT_EQ(codes(with(half_front, "[[0, 120], [80, 120]]", "[[0, 120], [0, 150], [20, 150]]")),
+            Codes{"line_along_edge front.chest"});
+  EXPECT_EQ(codes(with(half_front, "[[0, 120], [80, 120]]", "[[0.5, 120], [80, 120]]")),
+            Codes{"line_short_of_edge front.chest"});
+  EXPECT_EQ(codes(with(with(half_front, "e: [0, 180]", "e: [0, 180]\n      f: [0, 179.5]"), "{name: centre, path: [e, a]}",
+                       "{name: stub, path: [e, f]}\n      - {name: centre, path: [f, a]}")),
+            Codes{"short_edge front.stub"});
+  Pattern twice = parse(sleeve);
+  twice.pieces.push_back(twice.pieces[0]);
+  twice.pieces[1].name = "other";
+  const Issues issues = advice(twice);
+  ASSERT_EQ(issues.size(), 1u);
+  EXPECT_EQ(issues[0].code, "same_piece");
+  // What check() has something against is left alone.
+  twice.pieces[1].grain.reset();
+  EXPECT_TRUE(advice(twice).empty());
 }
 
 TEST(PatternCheck, panel_names_may_not_clash) {

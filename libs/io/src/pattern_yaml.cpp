@@ -26,22 +26,22 @@ class Reader {
  public:
   explicit Reader(std::string file) : file_(std::move(file)) {}
 
-  Result<PatternFile> read(std::string_view yaml) {
+  PatternReading read(std::string_view yaml) {
     try {
       const std::vector<YAML::Node> documents = YAML::LoadAll(std::string(yaml));
-      if (documents.size() != 1) {
-        return Issue{"bad_yaml",
-                     {.file = file_},
-                     fmt::format("the file has {} YAML documents instead of one", documents.size()),
-                     "write one mapping with units and pieces"};
+      if (documents.size() == 1) {
+        read_root(documents.front());
+      } else {
+        issues_.push_back(Issue{"bad_yaml",
+                                {.file = file_},
+                                fmt::format("the file has {} YAML documents instead of one", documents.size()),
+                                "write one mapping with units and pieces"});
       }
-      read_root(documents.front());
     } catch (const YAML::Exception& e) {
       const Place where{file_, e.mark.is_null() ? 0 : e.mark.line + 1, e.mark.is_null() ? 0 : e.mark.column + 1, ""};
       issues_.push_back(Issue{"bad_yaml", where, e.msg, "correct the YAML here"});
     }
-    if (!issues_.empty()) return issues_;
-    return std::move(result_);
+    return {std::move(result_), std::move(issues_)};
   }
 
  private:
@@ -602,12 +602,9 @@ class Writer {
 
 }  // namespace
 
-Result<PatternFile> parse_pattern_file(std::string_view yaml, const std::string& file) {
-  return Reader(file).read(yaml);
-}
+namespace {
 
-Issues check(const PatternFile& file) {
-  Issues issues = pattern::check(file.pattern);
+Issues placed(Issues issues, const PatternFile& file) {
   for (Issue& issue : issues) {
     const std::string item = issue.place.item;
     auto it = file.places.find(item);
@@ -618,6 +615,26 @@ Issues check(const PatternFile& file) {
     issue.place.item = item;
   }
   return issues;
+}
+
+}  // namespace
+
+PatternReading read_pattern_form(std::string_view yaml, const std::string& file) {
+  return Reader(file).read(yaml);
+}
+
+Result<PatternFile> parse_pattern_file(std::string_view yaml, const std::string& file) {
+  PatternReading reading = read_pattern_form(yaml, file);
+  if (!reading.issues.empty()) return std::move(reading.issues);
+  return std::move(reading.file);
+}
+
+Issues check(const PatternFile& file) {
+  return placed(pattern::check(file.pattern), file);
+}
+
+Issues advice(const PatternFile& file) {
+  return placed(pattern::advice(file.pattern), file);
 }
 
 Result<pattern::Pattern> parse_pattern(std::string_view yaml, const std::string& file) {

@@ -41,7 +41,7 @@ class PieceCheck {
       report("empty_outline", "", "it has no outline", "list its edges in order round the piece");
       return;
     }
-    if (check_loop(piece_.outline, "outline", outline_)) check_border();
+    check_border();
     check_holes();
     check_lines_and_marks();
     check_notches();
@@ -115,13 +115,10 @@ class PieceCheck {
       return false;
     }
     for (std::size_t i = 0; i < segments.size(); ++i) {
-      const Segment& s = segments[i];
-      if (!(s.from.allFinite() && s.to.allFinite() && s.control_1.allFinite() && s.control_2.allFinite() &&
-            std::isfinite(s.bulge))) {
-        report("broken_edge", name, fmt::format("segment {} has a number that is not finite", i + 1),
-               "give finite coordinates");
-        return false;
-      }
+      if (finite({segments[i]})) continue;
+      report("broken_edge", name, fmt::format("segment {} has a number that is not finite", i + 1),
+             "give finite coordinates");
+      return false;
     }
     bool good = true;
     for (std::size_t i = 0; i < segments.size(); ++i) {
@@ -142,51 +139,91 @@ class PieceCheck {
     return good;
   }
 
-  /// Checks the edges of a closed loop and leaves its curves in `curves`; false where they cannot be used further.
-  bool check_loop(const std::vector<Edge>& edges, const std::string& loop, std::vector<Curve>& curves) {
-    bool good = true;
-    for (const Edge& edge : edges) {
+  /// A closed row of curves as far as it can be used: edges without a fault, and straight bridges over gaps.
+  struct Loop {
+    std::vector<Curve> curves;
+    std::vector<std::string> names;  ///< of the edge that each curve is of; empty: a bridge
+    Polyline line;
+    double gap = 0;     ///< the widest that was bridged [m]
+    bool whole = true;  ///< the curves are the edges, one for one
+  };
+
+  /// Checks the edges of a closed loop. What is wrong with one edge does not hide what is wrong with the others.
+  std::optional<Loop> check_loop(const std::vector<Edge>& edges, const std::string& what) {
+    Loop loop;
+    std::vector<Segment> part;
+    const auto end_part = [&](const std::string& name) {
+      if (part.empty()) return;
+      loop.curves.emplace_back(std::move(part));
+      loop.names.push_back(name);
+      part.clear();
+    };
+    for (std::size_t i = 0; i < edges.size(); ++i) {
+      const Edge& edge = edges[i];
       if (edge.allowance && !(*edge.allowance >= 0))
         report("bad_allowance", edge.name, "its seam allowance is negative", "give a length of 0 or more");
-      if (!check_segments(edge.segments, edge.name, "zero_length_edge")) {
-        good = false;
-        continue;
-      }
+      loop.whole &= check_segments(edge.segments, edge.name, "zero_length_edge");
+      if (!finite(edge.segments)) continue;
       const auto end = [&](const std::string& name, const Point2& p, const char* which) {
         const auto it = piece_.points.find(name);
         if (it == piece_.points.end()) {
           report("unknown_point", edge.name, fmt::format("its {} point '{}' does not exist", which, name),
                  suggestion(name, point_names()));
-          good = false;
+          loop.whole = false;
         } else if (const double gap = (map_(it->second) - map_(p)).norm(); !(gap <= weld_tolerance)) {
           report("edge_off_point", edge.name,
                  fmt::format("it {}s at {}, {} away from point '{}'", which, at(map_(p)), length(gap), name),
                  "let the edge meet its point");
-          good = false;
+          loop.whole = false;
         }
       };
       end(edge.from, edge.segments.front().from, "start");
       end(edge.to, edge.segments.back().to, "end");
-    }
-    if (!good) return false;
-    for (std::size_t i = 0; i < edges.size(); ++i) {
       const Edge& next = edges[(i + 1) % edges.size()];
-      const Point2 a = map_(edges[i].segments.back().to), b = map_(next.segments.front().from);
-      if ((a - b).norm() > weld_tolerance) {
-        report("open_outline", edges[i].name,
-               fmt::format("the {} is open: it ends at {}, the next edge '{}' starts at {}, {} away", loop, at(a),
-                           next.name, at(b), length((a - b).norm())),
-               "list the edges in order, each starting at the point where the one before ends");
-        good = false;
+      if (finite(next.segments)) {
+        const Point2 a = map_(edge.segments.back().to), b = map_(next.segments.front().from);
+        if ((a - b).norm() > weld_tolerance) {
+          report("open_outline", edge.name,
+                 fmt::format("the {} is open: it ends at {}, the next edge '{}' starts at {}, {} away", what, at(a),
+                             next.name, at(b), length((a - b).norm())),
+                 "list the edges in order, each starting at the point where the one before ends");
+          loop.whole = false;
+        }
       }
+      for (const Segment& segment : edge.segments) {
+        const Segment s = map_(segment);
+        if (Curve({s}).length() <= weld_tolerance) continue;
+        if (!part.empty() && (part.back().to - s.from).norm() > weld_tolerance) end_part(edge.name);
+        part.push_back(s);
+      }
+      end_part(edge.name);
     }
-    if (!good) return false;
-    for (const Edge& edge : edges) {
-      std::vector<Segment> segments;
-      for (const Segment& segment : edge.segments) segments.push_back(map_(segment));
-      curves.emplace_back(std::move(segments));
+    if (loop.curves.empty()) return std::nullopt;
+    if (!loop.whole) bridge(loop);
+    loop.line = flatten(loop.curves, flat_tolerance);
+    return loop;
+  }
+
+  static void bridge(Loop& loop) {
+    Loop bridged{.gap = loop.gap, .whole = false};
+    for (std::size_t i = 0; i < loop.curves.size(); ++i) {
+      const Point2 a = loop.curves[i].to(), b = loop.curves[(i + 1) % loop.curves.size()].from();
+      bridged.curves.push_back(loop.curves[i]);
+      bridged.names.push_back(loop.names[i]);
+      const double gap = (b - a).norm();
+      if (gap <= weld_tolerance) continue;
+      bridged.curves.emplace_back(std::vector<Segment>{line_segment(a, b)});
+      bridged.names.emplace_back();
+      bridged.gap = std::max(bridged.gap, gap);
     }
-    return true;
+    loop = std::move(bridged);
+  }
+
+  static bool finite(const std::vector<Segment>& segments) {
+    return !segments.empty() && std::all_of(segments.begin(), segments.end(), [](const Segment& s) {
+      return s.from.allFinite() && s.to.allFinite() && s.control_1.allFinite() && s.control_2.allFinite() &&
+             std::isfinite(s.bulge);
+    });
   }
 
   std::vector<std::string> point_names() const {
@@ -196,14 +233,14 @@ class PieceCheck {
   }
 
   /// Crossings and touches between the sides of closed polylines; one issue for each pair of edges.
-  void check_crossings(const std::vector<std::pair<const std::vector<Edge>*, Polyline>>& loops) {
+  void check_crossings(const std::vector<const Loop*>& loops) {
     struct Side {
       double low, high;
       int loop, index;
     };
     std::vector<Side> sides;
     for (std::size_t l = 0; l < loops.size(); ++l) {
-      const Polyline& line = loops[l].second;
+      const Polyline& line = loops[l]->line;
       for (std::size_t i = 0; i + 1 < line.points.size(); ++i) {
         const double x0 = line.points[i].x(), x1 = line.points[i + 1].x();
         sides.push_back({std::min(x0, x1) - touch_tolerance, std::max(x0, x1) + touch_tolerance, static_cast<int>(l),
@@ -216,10 +253,11 @@ class PieceCheck {
     std::set<std::pair<std::string, std::string>> told;
     const auto tell = [&](const Side& a, const Side& b, const Point2& where, const char* how) {
       const auto name = [&](const Side& s) {
-        const auto& [edges, line] = loops[static_cast<std::size_t>(s.loop)];
-        return (*edges)[static_cast<std::size_t>(line.curve[static_cast<std::size_t>(s.index)])].name;
+        const Loop& loop = *loops[static_cast<std::size_t>(s.loop)];
+        return loop.names[static_cast<std::size_t>(loop.line.curve[static_cast<std::size_t>(s.index)])];
       };
       std::string first = name(a), second = name(b);
+      if (first.empty() || second.empty()) return;
       if (second < first) std::swap(first, second);
       if (!told.insert({first, second}).second) return;
       report("self_crossing", first,
@@ -230,8 +268,8 @@ class PieceCheck {
     for (std::size_t i = 0; i < sides.size(); ++i) {
       for (std::size_t j = i + 1; j < sides.size() && sides[j].low <= sides[i].high; ++j) {
         const Side &a = sides[i], &b = sides[j];
-        const auto& pa = loops[static_cast<std::size_t>(a.loop)].second.points;
-        const auto& pb = loops[static_cast<std::size_t>(b.loop)].second.points;
+        const auto& pa = loops[static_cast<std::size_t>(a.loop)]->line.points;
+        const auto& pb = loops[static_cast<std::size_t>(b.loop)]->line.points;
         const Point2 a0 = pa[static_cast<std::size_t>(a.index)], a1 = pa[static_cast<std::size_t>(a.index) + 1];
         const Point2 b0 = pb[static_cast<std::size_t>(b.index)], b1 = pb[static_cast<std::size_t>(b.index) + 1];
         if (std::max(a0.y(), a1.y()) + touch_tolerance < std::min(b0.y(), b1.y()) ||
@@ -265,50 +303,47 @@ class PieceCheck {
   }
 
   void check_border() {
-    border_ = flatten(outline_, flat_tolerance);
+    border_ = check_loop(piece_.outline, "outline");
+    if (!border_) return;
     double area = 0;
-    for (const Curve& curve : outline_) area += curve.sector_area();
-    if (std::abs(area) <= 1e-8) {
-      report("no_area", "", "its outline encloses no area", "check the points of the outline");
-      border_.reset();
-      return;
-    }
+    for (const Curve& curve : border_->curves) area += curve.sector_area();
+    if (std::abs(area) > 1e-8) return;
+    // A figure of eight has none either; what is bridged, for a reason that has been told.
     const std::size_t before = issues_.size();
-    check_crossings({{&piece_.outline, *border_}});
-    crossing_free_ = issues_.size() == before;
+    check_crossings({&*border_});
+    if (border_->whole && issues_.size() == before)
+      report("no_area", "", "its outline encloses no area", "check the points of the outline");
+    border_.reset();
   }
 
   void check_holes() {
-    std::vector<std::pair<const std::vector<Edge>*, Polyline>> loops;
     for (const Hole& hole : piece_.holes) {
       if (hole.edges.empty()) {
         report("empty_outline", hole.name, "the hole has no edges", "list its edges in order, or remove it");
         continue;
       }
-      std::vector<Curve> curves;
-      if (!check_loop(hole.edges, "hole", curves)) continue;
-      const Polyline loop = flatten(curves, flat_tolerance);
-      if (border_ && crossing_free_) {
-        for (const Point2& p : loop.points) {
-          if (!winds_around(*border_, p)) {
+      auto loop = check_loop(hole.edges, "hole");
+      if (!loop) continue;
+      if (border_) {
+        for (const Point2& p : loop->line.points) {
+          if (!winds_around(border_->line, p) && distance_to(border_->line, p) > border_->gap) {
             report("hole_outside", hole.name, fmt::format("the hole reaches outside the piece at {}", at(p)),
                    "keep it inside the outline");
             break;
           }
         }
       }
-      loops.emplace_back(&hole.edges, loop);
-      hole_loops_.push_back(loop);
+      holes_.push_back(std::move(*loop));
     }
-    if (!loops.empty()) {
-      if (border_ && crossing_free_) loops.emplace_back(&piece_.outline, *border_);
-      check_crossings(loops);
-    }
-    for (std::size_t i = 0; i < hole_loops_.size(); ++i) {
-      for (std::size_t j = 0; j < hole_loops_.size(); ++j) {
-        if (i != j && winds_around(hole_loops_[j], hole_loops_[i].points.front())) {
+    std::vector<const Loop*> loops;
+    if (border_) loops.push_back(&*border_);
+    for (const Loop& hole : holes_) loops.push_back(&hole);
+    check_crossings(loops);
+    for (std::size_t i = 0; i < holes_.size(); ++i) {
+      for (std::size_t j = 0; j < holes_.size(); ++j) {
+        if (i != j && winds_around(holes_[j].line, holes_[i].line.points.front())) {
           report("hole_outside", "",
-                 fmt::format("a hole at {} lies inside another hole", at(hole_loops_[i].points.front())),
+                 fmt::format("a hole at {} lies inside another hole", at(holes_[i].line.points.front())),
                  "remove one of them");
         }
       }
@@ -317,23 +352,35 @@ class PieceCheck {
 
   /// On the cloth, its border included.
   bool on_cloth(const Point2& p) const {
-    if (!winds_around(*border_, p) && distance_to(*border_, p) > on_edge_tolerance) return false;
-    return std::none_of(hole_loops_.begin(), hole_loops_.end(), [&](const Polyline& hole) {
-      return winds_around(hole, p) && distance_to(hole, p) > on_edge_tolerance;
+    const auto slack = [](const Loop& loop) { return std::max(loop.gap, on_edge_tolerance); };
+    if (!winds_around(border_->line, p) && distance_to(border_->line, p) > slack(*border_)) return false;
+    return std::none_of(holes_.begin(), holes_.end(), [&](const Loop& hole) {
+      return winds_around(hole.line, p) && distance_to(hole.line, p) > slack(hole);
     });
   }
 
   void check_lines_and_marks() {
     for (const InternalLine& line : piece_.lines) {
-      if (!check_segments(line.segments, line.name, "zero_length_line") || !border_) continue;
+      if (!check_segments(line.segments, line.name, "zero_length_line")) continue;
+      if (!border_) continue;
       std::vector<Segment> segments;
       for (const Segment& segment : line.segments) segments.push_back(map_(segment));
-      for (const Point2& p : flatten({Curve(std::move(segments))}, 1e-5).points) {
-        if (!on_cloth(p)) {
+      const Curve curve(std::move(segments));
+      if (line.kind == LineKind::dart && (curve.to() - curve.from()).norm() <= on_edge_tolerance) {
+        Loop loop{.curves = {curve}, .names = {line.name}};
+        loop.line = flatten(loop.curves, flat_tolerance);
+        check_crossings({&loop});
+      }
+      for (const Point2& p : flatten({curve}, 1e-5).points) {
+        if (on_cloth(p)) continue;
+        if (line.kind == LineKind::dart) {
+          report("dart_outside", line.name, fmt::format("the dart leaves the cloth at {}", at(p)),
+                 "move its tip onto the piece, end its legs at the border");
+        } else {
           report("line_outside", line.name, fmt::format("the line leaves the cloth at {}", at(p)),
                  "end it at the border");
-          break;
         }
+        break;
       }
     }
     if (!border_) return;
@@ -368,12 +415,9 @@ class PieceCheck {
                suggestion(notch.edge, names));
         continue;
       }
-      if (edge->segments.empty()) continue;
+      if (!finite(edge->segments)) continue;
       std::vector<Segment> segments;
       for (const Segment& segment : edge->segments) {
-        if (!segment.from.allFinite() || !segment.to.allFinite() || !segment.control_1.allFinite() ||
-            !segment.control_2.allFinite())
-          return;
         segments.push_back(map_(segment));
       }
       const Curve curve(std::move(segments));
@@ -418,14 +462,15 @@ class PieceCheck {
       const Edge& edge = piece_.outline[i];
       names.push_back(edge.name);
       if (edge.name != *piece_.fold) continue;
-      if (outline_.empty()) return;  // already told what is wrong with the outline
-      const Point2 a = outline_[i].from(), d = outline_[i].to() - a;
+      if (!border_ || !border_->whole) return;  // already told what is wrong with the outline
+      const Curve& curve = border_->curves[i];
+      const Point2 a = curve.from(), d = curve.to() - a;
       if (piece_.outline.size() < 2 || !(d.norm() > weld_tolerance)) {
         report("fold_not_straight", edge.name, "the fold starts and ends at the same point",
                "the fold is one straight edge of several");
         return;
       }
-      const Polyline fold = flatten({outline_[i]}, flat_tolerance);
+      const Polyline fold = flatten({curve}, flat_tolerance);
       double along = 0;
       for (const Point2& p : fold.points) {
         const double off = std::abs(cross(d.normalized(), p - a)), here = (p - a).dot(d.normalized());
@@ -437,10 +482,9 @@ class PieceCheck {
         }
         along = here;
       }
-      if (!border_) return;
       double low = 0, high = 0;
       Point2 low_at = a, high_at = a;
-      for (const Point2& p : border_->points) {
+      for (const Point2& p : border_->line.points) {
         const double side = cross(d.normalized(), p - a);
         if (side < low) low = side, low_at = p;
         if (side > high) high = side, high_at = p;
@@ -461,10 +505,8 @@ class PieceCheck {
   Issues& issues_;
   Similarity map_;
   double scale_;
-  std::vector<Curve> outline_;
-  std::optional<Polyline> border_;
-  bool crossing_free_ = false;
-  std::vector<Polyline> hole_loops_;
+  std::optional<Loop> border_;
+  std::vector<Loop> holes_;
 };
 
 }  // namespace

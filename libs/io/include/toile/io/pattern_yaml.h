@@ -19,8 +19,16 @@ struct PatternFile {
 /// Reads the form only; all of unknown_key (with the nearest known one), missing_key, duplicate_key, wrong_type,
 /// bad_number, bad_choice, unknown_point, bad_arc, bad_yaml are reported, with file:line:column.
 Result<PatternFile> parse_pattern_file(std::string_view yaml, const std::string& file);
+/// The same for those who want everything that is wrong at once: what could be read, and the issues.
+struct PatternReading {
+  PatternFile file;
+  Issues issues;
+};
+PatternReading read_pattern_form(std::string_view yaml, const std::string& file);
 /// pattern::check, each issue with its place in the file.
 Issues check(const PatternFile& file);
+/// pattern::advice, each with its place in the file.
+Issues advice(const PatternFile& file);
 
 /// Reads and checks.
 Result<pattern::Pattern> parse_pattern(std::string_view yaml, const std::string& file);

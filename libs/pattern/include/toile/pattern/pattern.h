@@ -95,9 +95,17 @@ struct Pattern {
 
 /// Everything that is wrong with a pattern, at once. Issue places name `piece.edge`; positions are in pattern units.
 ///   no_pieces, empty_outline, duplicate_name, bad_name, unknown_point, open_outline, edge_off_point, zero_length_edge,
-///   zero_length_line, broken_edge, self_crossing, hole_outside, line_outside, mark_outside, unknown_edge, bad_notch,
+///   zero_length_line, broken_edge, self_crossing, hole_outside, line_outside, dart_outside, mark_outside, unknown_edge, bad_notch,
 ///   notch_off_border, fold_not_straight, piece_across_fold, grain_missing, grain_zero, bad_copies, no_area
 Issues check(const Pattern& pattern);
+
+/// What is not wrong but probably not meant either, in pieces that check() has nothing against:
+///   dart_legs_differ   the legs of a dart (in the outline, as a hole, as lines) differ by more than 1 mm and 0.5 %
+///   line_along_edge    an internal line lies on the border or on another one: it cannot become an edge of the mesh
+///   line_short_of_edge an internal line ends between 0.1 and 1 mm before the border: it will not end on it
+///   short_edge         an edge is shorter than 1 mm
+///   same_piece         two pieces have the same outline
+Issues advice(const Pattern& pattern);
 
 /// Where to split an edge: at a named point of the piece, at a position, or at a distance from the edge's first point
 /// (negative: before its last); all in pattern units.
