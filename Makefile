@@ -7,7 +7,7 @@ JOBS ?= $(shell nproc)
 help:
 	@echo 'make tee      install what is missing, build, and make a T-shirt: pattern -> garment at rest on a dress form'
 	@echo 'make skirt    the same for a skirt with darts'
-	@echo 'make jacket   a man'"'"'s jacket, from pattern to sewn and layered shell, and a dress form (not yet put on it)'
+	@echo 'make jacket   a man'"'"'s jacket, from pattern to layered shell, put on a dress form (not yet draped)'
 	@echo 'make waistcoat   the same of a waistcoat'
 	@echo 'make test     build and run all tests'
 	@echo 'make bench    time the tee stage by stage, and reading and writing of large garments'

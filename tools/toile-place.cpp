@@ -13,7 +13,7 @@ struct PlaceStage {
 
   static stage::Description description() {
     return {.name = "toile-place",
-            .version = 2,
+            .version = 3,
             .summary = "Bends sewn flat panels around a body without stretching them and draws their seams together.",
             .example = "toile-place layered.ply form.ply -o placed.ply",
             .details = "Each panel goes on the trunk or on an arm, as its name and its seams say (front, back, waistband, sleeve), or as `panels` "
@@ -30,6 +30,7 @@ struct PlaceStage {
     TOILE_TRY(const mesh::GarmentMesh garment, run.garment("garment"));
     TOILE_TRY(const mesh::SupportMesh support, run.support("support"));
     TOILE_TRY(placement::Placed placed, placement::place(garment, support, params, [&](double f) { run.progress(f, "placing"); }));
+    for (const Issue& warning : placed.warnings) run.warn(warning);
     const placement::Report& report = placed.report;
     run.report("max_edge_strain", report.max_strain);
     run.report("rms_edge_strain", report.rms_strain);

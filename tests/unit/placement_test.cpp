@@ -283,7 +283,7 @@ TEST(body_frame, refuses_what_is_no_body) {
 TEST(layout, sleeves_go_where_their_armholes_are) {
   const auto g = boxy_tee();
   const auto frame = body_frame(man());
-  const auto layout = make_layout(g, man(), *frame, {});
+  const auto layout = make_layout(g, fold_flat(g), man(), *frame, {});
   ASSERT_TRUE(layout.has_value());
   EXPECT_EQ(layout->panels[0].region, Region::torso_front);
   EXPECT_EQ(layout->panels[1].region, Region::torso_back);
@@ -303,23 +303,23 @@ TEST(layout, says_what_it_cannot_place) {
   PlaceParams params;
   params.panels["frnt"] = {};
   const auto frame = body_frame(man());
-  const auto layout = make_layout(g, man(), *frame, params);
+  const auto layout = make_layout(g, fold_flat(g), man(), *frame, params);
   ASSERT_FALSE(layout.has_value());
   EXPECT_EQ(codes(layout.issues()), (std::vector<std::string>{"unknown_panel", "no_region"}));
   EXPECT_NE(layout.issues()[0].remedy.find("front"), std::string::npos);
 
   PlaceParams anchors;
   anchors.panels["front"].point = "tpo";
-  const auto bad_point = make_layout(boxy_tee(), man(), *frame, anchors);
+  const auto bad_point = make_layout(boxy_tee(), fold_flat(boxy_tee()), man(), *frame, anchors);
   ASSERT_FALSE(bad_point.has_value());
   EXPECT_NE(bad_point.issues()[0].remedy.find("top"), std::string::npos);
   anchors.panels["front"].point = "top";
   anchors.panels["front"].at = "wiast";
-  const auto bad_mark = make_layout(boxy_tee(), man(), *frame, anchors);
+  const auto bad_mark = make_layout(boxy_tee(), fold_flat(boxy_tee()), man(), *frame, anchors);
   ASSERT_FALSE(bad_mark.has_value());
   EXPECT_NE(bad_mark.issues()[0].remedy.find("waist"), std::string::npos);
   anchors.panels["front"].at = "waist";
-  const auto good = make_layout(boxy_tee(), man(), *frame, anchors);
+  const auto good = make_layout(boxy_tee(), fold_flat(boxy_tee()), man(), *frame, anchors);
   ASSERT_TRUE(good.has_value());
   EXPECT_NEAR(good->panels[0](Vector2d(0.1, 0.66)).y(), frame->waist, 1e-9);
 }
@@ -443,7 +443,7 @@ TEST(place, says_when_there_is_no_arm) {
   ASSERT_TRUE(frame.has_value());
   BodyFrame armless = *frame;
   armless.arm_left.reset();
-  const auto layout = make_layout(boxy_tee(), trunk, armless, {});
+  const auto layout = make_layout(boxy_tee(), fold_flat(boxy_tee()), trunk, armless, {});
   ASSERT_FALSE(layout.has_value());
   EXPECT_EQ(layout.issues().front().code, "no_arm");
   EXPECT_NE(layout.issues().front().place.item.find("sleeve_m"), std::string::npos);

@@ -84,6 +84,15 @@ const ConvexSection::Piece& ConvexSection::piece(double& s) const {
   return found;
 }
 
+double ConvexSection::facing(double s, const ConvexSection& other) const {
+  TOILE_CHECK(pieces_.size() == other.pieces_.size(), "pieces {} and {}", pieces_.size(), other.pieces_.size());
+  const double turns = std::floor((s + shift_) / perimeter_);
+  double rest = s;
+  const Piece& from = piece(rest);
+  const Piece& to = other.pieces_[static_cast<std::size_t>(&from - pieces_.data())];
+  return turns * other.perimeter_ + to.begin + (from.length > 0 ? rest / from.length : 0) * to.length - other.shift_;
+}
+
 Eigen::Vector2d ConvexSection::point(double s) const {
   const Piece& p = piece(s);
   if (p.arc) {

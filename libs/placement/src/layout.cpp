@@ -17,11 +17,13 @@ using Eigen::Vector2d;
 constexpr double kOpen = 0.006;  // seams of neighbours start so far apart at least [m]
 constexpr double kBand = 3;  // a panel longer than this times its width is a band: its seams say how it is turned
 
-// Welds of one seam between two panels.
+// Welds of one seam between two panels; or the fasteners between them (seam -1), which say how far round panels go that no
+// seam closes.
 struct Join {
   int seam = 0, a = 0, b = 0;          // a <= b: panel ids
   std::vector<std::pair<int, int>> pairs;  // vertices of a and b
   std::vector<int> rows;               // of welds
+  bool sewn() const { return seam >= 0; }
 };
 
 std::vector<Join> find_joins(const mesh::GarmentMesh& garment) {
@@ -40,25 +42,35 @@ std::vector<Join> find_joins(const mesh::GarmentMesh& garment) {
     join.pairs.emplace_back(va, vb);
     join.rows.push_back(static_cast<int>(w));
   }
+  for (const mesh::Fastener& fastener : garment.fasteners) {
+    int va = fastener.a, vb = fastener.b;
+    if (!fastener.closed) continue;
+    if (garment.vertex_panel[va] > garment.vertex_panel[vb]) std::swap(va, vb);
+    Join& join = joins[{-1, garment.vertex_panel[va], garment.vertex_panel[vb]}];
+    join.seam = -1;
+    join.a = garment.vertex_panel[va];
+    join.b = garment.vertex_panel[vb];
+    join.pairs.emplace_back(va, vb);
+  }
   std::vector<Join> result;
   for (auto& [key, join] : joins) result.push_back(std::move(join));
   return result;
 }
 
-Vector2d uv_of(const mesh::GarmentMesh& garment, int vertex) { return garment.uv.row(vertex).transpose(); }
+Vector2d uv_of(const FoldedFlat& flat, int vertex) { return flat.uv.row(vertex).transpose(); }
 
 // Rotation that brings the b side of a join onto the laid out a side, in quarter turns, and how well it fits.
-double fitting_turn(const mesh::GarmentMesh& garment, const Join& join, const PanelLayout& a, bool a_is_first) {
+double fitting_turn(const FoldedFlat& flat, const Join& join, const PanelLayout& a, bool a_is_first) {
   Vector2d mean_p = Vector2d::Zero(), mean_q = Vector2d::Zero();
   for (const auto& [va, vb] : join.pairs) {
-    mean_p += a(uv_of(garment, a_is_first ? va : vb));
-    mean_q += uv_of(garment, a_is_first ? vb : va);
+    mean_p += a(uv_of(flat, a_is_first ? va : vb));
+    mean_q += uv_of(flat, a_is_first ? vb : va);
   }
   mean_p /= static_cast<double>(join.pairs.size());
   mean_q /= static_cast<double>(join.pairs.size());
   double cross = 0, dot = 0;
   for (const auto& [va, vb] : join.pairs) {
-    const Vector2d p = a(uv_of(garment, a_is_first ? va : vb)) - mean_p, q = uv_of(garment, a_is_first ? vb : va) - mean_q;
+    const Vector2d p = a(uv_of(flat, a_is_first ? va : vb)) - mean_p, q = uv_of(flat, a_is_first ? vb : va) - mean_q;
     cross += q.x() * p.y() - q.y() * p.x();
     dot += q.dot(p);
   }
@@ -71,22 +83,24 @@ struct Extent {
   Vector2d centre() const { return 0.5 * (low + high); }
 };
 
-Extent extent_of(const mesh::GarmentMesh& garment, int panel, const PanelLayout& layout) {
+Extent extent_of(const mesh::GarmentMesh& garment, const FoldedFlat& flat, int panel, const PanelLayout& layout) {
   Extent e{Vector2d::Constant(1e9), Vector2d::Constant(-1e9)};
   for (Eigen::Index v = 0; v < garment.vertex_count(); ++v) {
     if (garment.vertex_panel[v] != panel) continue;
-    const Vector2d p = layout(uv_of(garment, static_cast<int>(v)));
+    const Vector2d p = layout(uv_of(flat, static_cast<int>(v)));
     e.low = e.low.cwiseMin(p);
     e.high = e.high.cwiseMax(p);
   }
   return e;
 }
 
+bool on_trunk(Region region) { return region != Region::arm && region != Region::arm_left && region != Region::arm_right && region != Region::attached; }
 bool on_arm(Region region) { return region == Region::arm || region == Region::arm_left || region == Region::arm_right; }
 
 // A first idea from the name of the panel or of its piece.
 Region region_from_name(const std::string& name) {
   const auto has = [&](const char* word) { return name.find(word) != std::string::npos; };
+  if (has("collar") || has("hood") || has("neckband") || has("stand")) return Region::attached;
   if (has("sleeve") || has("cuff")) return Region::arm;
   if (has("waistband") || has("band") || has("belt")) return Region::waist;
   if (has("front")) return Region::torso_front;
@@ -102,7 +116,7 @@ Vector2d PanelLayout::operator()(const Vector2d& uv) const {
   return Vector2d(c * uv.x() - s * uv.y(), s * uv.x() + c * uv.y()) + shift;
 }
 
-Result<Layout> make_layout(const mesh::GarmentMesh& garment, const mesh::SupportMesh& support, const BodyFrame& frame, const PlaceParams& params) {
+Result<Layout> make_layout(const mesh::GarmentMesh& garment, const FoldedFlat& flat, const mesh::SupportMesh& support, const BodyFrame& frame, const PlaceParams& params) {
   Issues issues;
   const int count = static_cast<int>(garment.panels.size());
   const auto panel_name = [&](int p) { return "panel " + garment.panels[static_cast<std::size_t>(p)].name; };
@@ -150,16 +164,16 @@ Result<Layout> make_layout(const mesh::GarmentMesh& garment, const mesh::Support
       bool best_a_first = true;
       double best_turn = 0;
       for (const Join& join : joins) {
-        if (join.a == join.b || !member(join.a) || !member(join.b) || laid.count(join.a) == laid.count(join.b) || join.pairs.size() < 2) continue;
+        if (!join.sewn() || join.a == join.b || !member(join.a) || !member(join.b) || laid.count(join.a) == laid.count(join.b) || join.pairs.size() < 2) continue;
         const bool a_first = laid.count(join.a) > 0;
         const int fresh = a_first ? join.b : join.a;
         const PanelLayout& known = layout.panels[static_cast<std::size_t>(a_first ? join.a : join.b)];
         const PanelSpec* spec = specs[static_cast<std::size_t>(fresh)];
-        PanelLayout flat;
-        flat.turn = spec ? spec->turn : 0;
-        const Vector2d size = extent_of(garment, fresh, flat).size();
+        PanelLayout upright;
+        upright.turn = spec ? spec->turn : 0;
+        const Vector2d size = extent_of(garment, flat, fresh, upright).size();
         const bool band = layout.panels[static_cast<std::size_t>(fresh)].region == Region::waist || std::max(size.x(), size.y()) > kBand * std::min(size.x(), size.y());
-        const double turn = fitting_turn(garment, join, known, a_first) - flat.turn;
+        const double turn = fitting_turn(flat, join, known, a_first) - upright.turn;
         int quarters = static_cast<int>(std::lround(turn / (std::numbers::pi / 2)));
         quarters = ((quarters % 4) + 4) % 4;
         // A seam that would turn a piece over (a shoulder, a fold) does not say where it lies on the tube.
@@ -168,7 +182,7 @@ Result<Layout> make_layout(const mesh::GarmentMesh& garment, const mesh::Support
         if (!best || join.pairs.size() > best->pairs.size()) {
           best = &join;
           best_a_first = a_first;
-          best_turn = flat.turn + quarters * (std::numbers::pi / 2);
+          best_turn = upright.turn + quarters * (std::numbers::pi / 2);
         }
       }
       if (!best) break;
@@ -179,16 +193,16 @@ Result<Layout> make_layout(const mesh::GarmentMesh& garment, const mesh::Support
       panel.shift.setZero();
       Vector2d sum = Vector2d::Zero();
       for (const auto& [va, vb] : best->pairs) {
-        sum += known(uv_of(garment, best_a_first ? va : vb)) - panel(uv_of(garment, best_a_first ? vb : va));
+        sum += known(uv_of(flat, best_a_first ? va : vb)) - panel(uv_of(flat, best_a_first ? vb : va));
       }
       panel.shift = sum / static_cast<double>(best->pairs.size());
       // Side by side (or one above the other) without overlap, whatever the curves of the seam.
-      const Vector2d way = extent_of(garment, fresh, panel).centre() - extent_of(garment, best_a_first ? best->a : best->b, known).centre();
+      const Vector2d way = extent_of(garment, flat, fresh, panel).centre() - extent_of(garment, flat, best_a_first ? best->a : best->b, known).centre();
       const int axis = std::abs(way.x()) > std::abs(way.y()) ? 0 : 1;
       const double sense = way[axis] > 0 ? 1 : -1;
       double push = 0;
       for (const auto& [va, vb] : best->pairs) {
-        push = std::max(push, sense * (known(uv_of(garment, best_a_first ? va : vb)) - panel(uv_of(garment, best_a_first ? vb : va)))[axis]);
+        push = std::max(push, sense * (known(uv_of(flat, best_a_first ? va : vb)) - panel(uv_of(flat, best_a_first ? vb : va)))[axis]);
       }
       panel.shift[axis] += sense * (push + kOpen);
       laid.insert(fresh);
@@ -197,7 +211,7 @@ Result<Layout> make_layout(const mesh::GarmentMesh& garment, const mesh::Support
     // Seams between laid out panels that do not meet: they close the tube, and say how far round it is.
     double low = 1e9, high = -1e9;
     for (int p : laid) {
-      const Extent e = extent_of(garment, p, layout.panels[static_cast<std::size_t>(p)]);
+      const Extent e = extent_of(garment, flat, p, layout.panels[static_cast<std::size_t>(p)]);
       low = std::min(low, e.low.x());
       high = std::max(high, e.high.x());
     }
@@ -206,22 +220,26 @@ Result<Layout> make_layout(const mesh::GarmentMesh& garment, const mesh::Support
       if (!laid.count(join.a) || !laid.count(join.b)) continue;
       double mismatch = 0;
       for (const auto& [va, vb] : join.pairs) {
-        mismatch = std::max(mismatch, std::abs((layout.panels[static_cast<std::size_t>(join.a)](uv_of(garment, va)) -
-                                                layout.panels[static_cast<std::size_t>(join.b)](uv_of(garment, vb))).x()));
+        mismatch = std::max(mismatch, std::abs((layout.panels[static_cast<std::size_t>(join.a)](uv_of(flat, va)) -
+                                                layout.panels[static_cast<std::size_t>(join.b)](uv_of(flat, vb))).x()));
       }
-      if (join.a != join.b) {
-        const double turn = fitting_turn(garment, join, layout.panels[static_cast<std::size_t>(join.a)], true) - layout.panels[static_cast<std::size_t>(join.b)].turn;
+      if (join.a != join.b && join.sewn()) {
+        const double turn = fitting_turn(flat, join, layout.panels[static_cast<std::size_t>(join.a)], true) - layout.panels[static_cast<std::size_t>(join.b)].turn;
         if (std::cos(turn) < 0.7) continue;
       }
-      if (mismatch > 0.5 * (high - low)) girth = std::max(girth, mismatch + kOpen);
+      if (mismatch > 0.5 * (high - low)) girth = std::max(girth, mismatch + (join.sewn() ? kOpen : 0));
     }
     return laid;
   };
 
+  for (PanelLayout& panel : layout.panels) {
+    if (panel.region == Region::attached) panel.part = Part::attached;
+  }
+
   // The trunk.
   std::vector<int> trunk;
   for (int p = 0; p < count; ++p) {
-    if (!on_arm(layout.panels[static_cast<std::size_t>(p)].region)) trunk.push_back(p);
+    if (on_trunk(layout.panels[static_cast<std::size_t>(p)].region)) trunk.push_back(p);
   }
   const auto shift_group = [&](const std::set<int>& group, const Vector2d& by) {
     for (int p : group) layout.panels[static_cast<std::size_t>(p)].shift += by;
@@ -244,7 +262,7 @@ Result<Layout> make_layout(const mesh::GarmentMesh& garment, const mesh::Support
       const int root = *std::min_element(rest.begin(), rest.end(), [&](int a, int b) { return std::pair(rank(a), a) < std::pair(rank(b), b); });
       double girth = 0;
       PanelLayout& first = layout.panels[static_cast<std::size_t>(root)];
-      const Vector2d size = extent_of(garment, root, PanelLayout{}).size();
+      const Vector2d size = extent_of(garment, flat, root, PanelLayout{}).size();
       auto group = lay_out(rest, root, girth);
       if (first.region == Region::waist && group.size() == 1 && size.y() > size.x() && !specs[static_cast<std::size_t>(root)]) {
         first.turn = std::numbers::pi / 2;
@@ -257,28 +275,32 @@ Result<Layout> make_layout(const mesh::GarmentMesh& garment, const mesh::Support
     double girth = layout.girth_trunk;
     if (girth <= 0) {
       for (const auto& group : groups) {
-        for (int p : group) girth = std::max(girth, 2 * extent_of(garment, p, layout.panels[static_cast<std::size_t>(p)]).size().x());
+        for (int p : group) girth = std::max(girth, 2 * extent_of(garment, flat, p, layout.panels[static_cast<std::size_t>(p)]).size().x());
       }
     }
     for (const auto& group : groups) {
-      double best_rank = 9, low = 1e9, high = -1e9, low_h = 1e9, high_h = -1e9;
+      double best_rank = 9, low = 1e9, high = -1e9;
       for (int p : group) best_rank = std::min<double>(best_rank, rank(p));
+      // The panels of that rank may stand at both ends of the strip (fronts that open): their mean is one on a circle.
+      Vector2d sum = Vector2d::Zero();
       for (int p : group) {
-        const Extent e = extent_of(garment, p, layout.panels[static_cast<std::size_t>(p)]);
-        low_h = std::min(low_h, e.low.y());
-        high_h = std::max(high_h, e.high.y());
+        const Extent e = extent_of(garment, flat, p, layout.panels[static_cast<std::size_t>(p)]);
         if (rank(p) != best_rank) continue;
         low = std::min(low, e.low.x());
         high = std::max(high, e.high.x());
+        const double angle = 2 * std::numbers::pi * e.centre().x() / girth;
+        sum += Vector2d(std::cos(angle), std::sin(angle));
       }
+      double middle = 0.5 * (low + high);
+      if (high - low > 0.75 * girth) middle = std::atan2(sum.y(), sum.x()) * girth / (2 * std::numbers::pi);
       const std::array<double, 6> at{0, 0.5, 0.25, 0.75, 0, 0};
-      shift_group(group, {at[static_cast<std::size_t>(best_rank)] * girth - 0.5 * (low + high), 0});
+      shift_group(group, {at[static_cast<std::size_t>(best_rank)] * girth - middle, 0});
     }
     // Shoulders: seams between laid out panels of the trunk that turn over.
     for (const Join& join : joins) {
       const PanelLayout &a = layout.panels[static_cast<std::size_t>(join.a)], &b = layout.panels[static_cast<std::size_t>(join.b)];
-      if (join.a == join.b || on_arm(a.region) || on_arm(b.region) || join.pairs.size() < 2) continue;
-      const double turn = fitting_turn(garment, join, a, true) - b.turn;
+      if (!join.sewn() || join.a == join.b || !on_trunk(a.region) || !on_trunk(b.region) || join.pairs.size() < 2) continue;
+      const double turn = fitting_turn(flat, join, a, true) - b.turn;
       if (std::cos(turn) < -0.2) layout.shoulder_welds.insert(layout.shoulder_welds.end(), join.rows.begin(), join.rows.end());
     }
     // Heights.
@@ -294,7 +316,7 @@ Result<Layout> make_layout(const mesh::GarmentMesh& garment, const mesh::Support
         bool known = false;
         for (const auto& point : garment.points) {
           if (point.panel == p && point.name == *spec->point) {
-            height = panel(uv_of(garment, point.vertex)).y();
+            height = panel(uv_of(flat, point.vertex)).y();
             known = true;
           }
         }
@@ -302,7 +324,7 @@ Result<Layout> make_layout(const mesh::GarmentMesh& garment, const mesh::Support
           for (const auto& run : garment.runs) {
             if (run.panel != p || run.name != *spec->point) continue;
             const auto ids = mesh::run_vertex_ids(garment, run.id);
-            for (int v : ids) height += panel(uv_of(garment, v)).y() / static_cast<double>(ids.size());
+            for (int v : ids) height += panel(uv_of(flat, v)).y() / static_cast<double>(ids.size());
             known = !ids.empty();
           }
         }
@@ -336,7 +358,7 @@ Result<Layout> make_layout(const mesh::GarmentMesh& garment, const mesh::Support
           for (const int v : {garment.welds[static_cast<std::size_t>(row)].a, garment.welds[static_cast<std::size_t>(row)].b}) {
             const int p = garment.vertex_panel[v];
             if (!group.count(p)) continue;
-            Vector2d at = layout.panels[static_cast<std::size_t>(p)](uv_of(garment, v));
+            Vector2d at = layout.panels[static_cast<std::size_t>(p)](uv_of(flat, v));
             if (layout.panels[static_cast<std::size_t>(p)].region == Region::torso_back) at.x() -= 0.5 * girth;
             at.x() -= girth * std::round(at.x() / girth);
             if (const auto top = outline_top(support, frame.x_mid + at.x())) {
@@ -351,7 +373,7 @@ Result<Layout> make_layout(const mesh::GarmentMesh& garment, const mesh::Support
         // Hung from the waist: a waistband's middle, or else the top edge.
         double top = -1e9, band_low = 1e9, band_high = -1e9;
         for (int p : group) {
-          const Extent e = extent_of(garment, p, layout.panels[static_cast<std::size_t>(p)]);
+          const Extent e = extent_of(garment, flat, p, layout.panels[static_cast<std::size_t>(p)]);
           top = std::max(top, e.high.y());
           if (layout.panels[static_cast<std::size_t>(p)].region == Region::waist) {
             band_low = std::min(band_low, e.low.y());
@@ -377,7 +399,7 @@ Result<Layout> make_layout(const mesh::GarmentMesh& garment, const mesh::Support
       for (const Join& join : joins) {
         for (const auto& [self, other, second] : {std::tuple(join.a, join.b, true), std::tuple(join.b, join.a, false)}) {
           const PanelLayout &mine = layout.panels[static_cast<std::size_t>(self)], &theirs = layout.panels[static_cast<std::size_t>(other)];
-          if (self == other || !on_arm(mine.region) || side[static_cast<std::size_t>(self)] != 0) continue;
+          if (!join.sewn() || self == other || !on_arm(mine.region) || theirs.region == Region::attached || side[static_cast<std::size_t>(self)] != 0) continue;
           if (on_arm(theirs.region)) {
             if (side[static_cast<std::size_t>(other)] == 0) continue;
             next[static_cast<std::size_t>(self)] += (side[static_cast<std::size_t>(other)] > 0 ? 1e-3 : -1e-3);
@@ -385,7 +407,7 @@ Result<Layout> make_layout(const mesh::GarmentMesh& garment, const mesh::Support
             continue;
           }
           for (const auto& [va, vb] : join.pairs) {
-            double a = theirs(uv_of(garment, second ? vb : va)).x() / girth;
+            double a = theirs(uv_of(flat, second ? vb : va)).x() / girth;
             a -= std::floor(a);
             next[static_cast<std::size_t>(self)] += a < 0.5 ? 1 : -1;
             changed = true;
@@ -427,7 +449,7 @@ Result<Layout> make_layout(const mesh::GarmentMesh& garment, const mesh::Support
     while (!rest.empty()) {
       // the widest panel first
       const int root = *std::max_element(rest.begin(), rest.end(), [&](int a, int b) {
-        const double x = extent_of(garment, a, PanelLayout{}).size().x(), y = extent_of(garment, b, PanelLayout{}).size().x();
+        const double x = extent_of(garment, flat, a, PanelLayout{}).size().x(), y = extent_of(garment, flat, b, PanelLayout{}).size().x();
         return x != y ? x < y : a > b;
       });
       double g = 0;

@@ -2,15 +2,20 @@
 
 #include "toile/contact/exact.h"
 #include "toile/contact/support_field.h"
+#include "toile/contact/untangle.h"
 #include "toile/geometry/slice.h"
+#include "toile/mesh/topology.h"
+#include "toile/placement/attach.h"
 #include "toile/placement/coarse.h"
 #include "toile/placement/developable.h"
 #include "toile/placement/relax.h"
+#include "toile/placement/subset.h"
 
 #include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 
 namespace toile::placement {
@@ -25,6 +30,7 @@ constexpr double kPolish = 0.8;           // polishing goes on until strains are
 constexpr double kArmTransition = 0.08;   // from the trunk's side to where arms keep their true shape [m]
 constexpr double kNarrow = 0.01;          // cloth may lack this part of a girth before it is refused: it can slide to where it fits
 constexpr double kSleeveGap = 0.004;       // between a sleeve and the trunk's panels at the start [m]
+constexpr double kSheet = 0.004;           // between sheets that lie on one another at the start [m]
 
 double polygon_perimeter(const Points2& p) {
   double sum = 0;
@@ -32,13 +38,13 @@ double polygon_perimeter(const Points2& p) {
   return sum;
 }
 
-// Convex hull, (z, x) counter-clockwise, of the free trunk over a range of heights, flattened and made symmetric.
-Points2 trunk_hull(const BodyFrame& frame, double low, double high, double flatten, double z_middle) {
+// Convex hull, (z, x) counter-clockwise, of the free trunk over a range of heights, made symmetric.
+Points2 trunk_hull(const BodyFrame& frame, double low, double high) {
   std::vector<Vector3d> points;
   for (const Section& section : frame.sections) {
     if (section.merged || section.y < low - 0.01 || section.y > high + 0.01) continue;
     for (Eigen::Index i = 0; i < section.hull.rows(); ++i) {
-      const double z = z_middle + flatten * (section.hull(i, 0) - z_middle), x = section.hull(i, 1) - frame.x_mid;
+      const double z = section.hull(i, 0), x = section.hull(i, 1) - frame.x_mid;
       points.emplace_back(frame.x_mid + x, 0, z);
       points.emplace_back(frame.x_mid - x, 0, z);
     }
@@ -50,6 +56,12 @@ Points2 trunk_hull(const BodyFrame& frame, double low, double high, double flatt
   flat.col(0) = hull.col(2);
   flat.col(1) = hull.col(0);
   return flat;
+}
+
+// The hull with its depths scaled about z_middle: still the hull of the scaled points.
+Points2 flattened_hull(Points2 hull, double flatten, double z_middle) {
+  hull.col(0) = (z_middle + flatten * (hull.col(0).array() - z_middle)).matrix();
+  return hull;
 }
 
 // How much cloth lies on the level line h in the unrolled part, panels counted together [m].
@@ -74,6 +86,27 @@ double width_at(const mesh::GarmentMesh& garment, const Layout& layout, const st
   return sum;
 }
 
+// Whether the cloth goes all the way round at the level h: its cut ends lie at seams, or at edges that fasteners close there.
+bool goes_round(const mesh::GarmentMesh& garment, const Layout& layout, const std::vector<Vector2d>& flat, const std::vector<mesh::Edge>& borders, const std::vector<char>& welded, Part part, double h) {
+  for (const mesh::Edge& edge : borders) {
+    const Vector2d &a = flat[static_cast<std::size_t>(edge.a)], &b = flat[static_cast<std::size_t>(edge.b)];
+    const int panel = garment.vertex_panel[edge.a];
+    if (layout.panels[static_cast<std::size_t>(panel)].part != part || (a.y() < h) == (b.y() < h)) continue;
+    if (welded[static_cast<std::size_t>(edge.a)] && welded[static_cast<std::size_t>(edge.b)]) continue;
+    double low = 1e9, high = -1e9;
+    for (const mesh::Fastener& fastener : garment.fasteners) {
+      if (!fastener.closed) continue;
+      for (const int v : {fastener.a, fastener.b}) {
+        if (garment.vertex_panel[v] != panel) continue;
+        low = std::min(low, flat[static_cast<std::size_t>(v)].y());
+        high = std::max(high, flat[static_cast<std::size_t>(v)].y());
+      }
+    }
+    if (h < low || h > high) return false;
+  }
+  return true;
+}
+
 std::string names_of(const mesh::GarmentMesh& garment, const std::vector<int>& panels) {
   std::string text;
   for (int p : panels) text += (text.empty() ? "" : ", ") + garment.panels[static_cast<std::size_t>(p)].name;
@@ -87,18 +120,57 @@ Issue too_narrow(const mesh::GarmentMesh& garment, const std::vector<int>& panel
                .remedy = "use a larger size of the pattern or a smaller support", .category = Category::input};
 }
 
+// How many sheets lie between each vertex and the innermost of its part: folded parts, and panels whose order is greater.
+// Panels that lap over one another without an order: where a fastener joins them, its second half lies over the first (a
+// buttonhole over its button).
+std::vector<int> orders(const mesh::GarmentMesh& garment) {
+  std::vector<int> order;
+  for (const mesh::Panel& panel : garment.panels) order.push_back(panel.order);
+  for (const mesh::Fastener& fastener : garment.fasteners) {
+    const auto a = static_cast<std::size_t>(garment.vertex_panel[fastener.a]), b = static_cast<std::size_t>(garment.vertex_panel[fastener.b]);
+    if (fastener.closed && a != b && order[a] == order[b]) ++order[b];
+  }
+  return order;
+}
+
+std::vector<double> sheets(const mesh::GarmentMesh& garment, const FoldedFlat& folded, const Layout& layout) {
+  std::vector<double> result(folded.layer.size(), 0);
+  const std::vector<int> order = orders(garment);
+  for (const Part part : {Part::trunk, Part::arm_left, Part::arm_right}) {
+    std::map<int, std::pair<double, double>> range;  // by order: least and greatest layer
+    for (Eigen::Index v = 0; v < garment.vertex_count(); ++v) {
+      const auto p = static_cast<std::size_t>(garment.vertex_panel[v]);
+      if (layout.panels[p].part != part) continue;
+      auto& [least, greatest] = range.try_emplace(order[p], 0.0, 0.0).first->second;
+      least = std::min(least, folded.layer[static_cast<std::size_t>(v)]);
+      greatest = std::max(greatest, folded.layer[static_cast<std::size_t>(v)]);
+    }
+    std::map<int, double> base;
+    double next = 0;
+    for (const auto& [level, layers] : range) {
+      base[level] = next - layers.first;
+      next += layers.second - layers.first + 1;
+    }
+    for (Eigen::Index v = 0; v < garment.vertex_count(); ++v) {
+      const auto p = static_cast<std::size_t>(garment.vertex_panel[v]);
+      if (layout.panels[p].part == part) result[static_cast<std::size_t>(v)] = base[order[p]] + folded.layer[static_cast<std::size_t>(v)];
+    }
+  }
+  return result;
+}
+
 }  // namespace
 
-Result<Start> bend(const mesh::GarmentMesh& garment, const mesh::SupportMesh& support, const BodyFrame& frame, const Layout& layout, const PlaceParams& params) {
-  (void)support;
+Result<Start> bend(const mesh::GarmentMesh& garment, const FoldedFlat& folded, const BodyFrame& frame, const Layout& layout, const PlaceParams& params) {
   Issues issues;
   Start start;
   const Eigen::Index n = garment.vertex_count();
-  start.x.resize(n, 3);
+  start.x = Points3::Zero(n, 3);
   std::vector<Vector2d> flat(static_cast<std::size_t>(n));
   for (Eigen::Index v = 0; v < n; ++v) {
-    flat[static_cast<std::size_t>(v)] = layout.panels[static_cast<std::size_t>(garment.vertex_panel[v])](garment.uv.row(v).transpose());
+    flat[static_cast<std::size_t>(v)] = layout.panels[static_cast<std::size_t>(garment.vertex_panel[v])](folded.uv.row(v).transpose());
   }
+  const std::vector<double> sheet = sheets(garment, folded, layout);
   const auto part_of = [&](Eigen::Index v) { return layout.panels[static_cast<std::size_t>(garment.vertex_panel[v])].part; };
 
   // The trunk: a vertical tube around the flattened body, as wide as the panels are together.
@@ -132,10 +204,12 @@ Result<Start> bend(const mesh::GarmentMesh& garment, const mesh::SupportMesh& su
     start.flattening.z_middle = 0.5 * (z_low + z_high);
     const double margin = std::max(2 * params.offset, 0.008);
     double girth = layout.girth_trunk;
+    const Points2 full = trunk_hull(frame, low, high);
+    const auto hull_at = [&](double flatten) { return flattened_hull(full, flatten, start.flattening.z_middle); };
     const auto spare = [&](double flatten) {
-      return (girth - polygon_perimeter(trunk_hull(frame, low, high, flatten, start.flattening.z_middle))) / (2 * std::numbers::pi);
+      return (girth - polygon_perimeter(hull_at(flatten))) / (2 * std::numbers::pi);
     };
-    if (girth <= 0) girth = std::max(a_high - a_low, polygon_perimeter(trunk_hull(frame, low, high, start.flattening.depth, start.flattening.z_middle)) + 2 * std::numbers::pi * margin);
+    if (girth <= 0) girth = std::max(a_high - a_low, polygon_perimeter(hull_at(start.flattening.depth)) + 2 * std::numbers::pi * margin);
     while (spare(start.flattening.depth) < margin && start.flattening.depth > 0.06) start.flattening.depth *= 0.95;
     // Level by level, up to the lowest point of an armhole: cloth against body.
     if (layout.girth_trunk > 0) {
@@ -144,10 +218,15 @@ Result<Start> bend(const mesh::GarmentMesh& garment, const mesh::SupportMesh& su
         const bool a = part_of(weld.a) == Part::trunk, b = part_of(weld.b) == Part::trunk;
         if (a != b) ceiling = std::min(ceiling, flat[static_cast<std::size_t>(a ? weld.a : weld.b)].y());
       }
+      std::vector<mesh::Edge> borders = mesh::edges(garment.faces);
+      std::erase_if(borders, [](const mesh::Edge& edge) { return edge.faces.size() != 1; });
+      std::vector<char> welded(static_cast<std::size_t>(n), 0);
+      for (const mesh::Weld& weld : garment.welds) welded[static_cast<std::size_t>(weld.a)] = welded[static_cast<std::size_t>(weld.b)] = 1;
       double worst = 0;
       std::optional<Issue> narrow;
       for (const Section& section_ : frame.sections) {
         if (section_.merged || section_.y > ceiling - 0.01 || section_.y < low + 0.005 || section_.y > high - 0.005) continue;
+        if (!goes_round(garment, layout, flat, borders, welded, Part::trunk, section_.y)) continue;
         std::vector<int> panels;
         // The widest within a hand's breadth: edges curve, bands slide.
         double width = 0;
@@ -167,10 +246,27 @@ Result<Start> bend(const mesh::GarmentMesh& garment, const mesh::SupportMesh& su
                         .remedy = "use a larger size of the pattern or a smaller support", .category = Category::input});
     }
     if (!issues.empty()) return issues;
-    const ConvexSection section(trunk_hull(frame, low, high, start.flattening.depth, start.flattening.z_middle), spare(start.flattening.depth), Vector2d(start.flattening.z_middle, frame.x_mid), Vector2d(1, 0));
+    const Points2 hull = hull_at(start.flattening.depth);
+    const Vector2d axis(start.flattening.z_middle, frame.x_mid);
+    const ConvexSection section(hull, spare(start.flattening.depth), axis, Vector2d(1, 0));
+    // Sheets that lie on others: on parallel curves, each panel's middle facing where it would be on the first.
+    std::map<double, ConvexSection> outer;
+    std::vector<double> middle(garment.panels.size(), 0), count(garment.panels.size(), 0);
+    for (Eigen::Index v = 0; v < n; ++v) {
+      const auto p = static_cast<std::size_t>(garment.vertex_panel[v]);
+      middle[p] += flat[static_cast<std::size_t>(v)].x();
+      count[p] += 1;
+    }
     for (Eigen::Index v = 0; v < n; ++v) {
       if (part_of(v) != Part::trunk) continue;
-      const Vector2d at = section.point(flat[static_cast<std::size_t>(v)].x());
+      const auto p = static_cast<std::size_t>(garment.vertex_panel[v]);
+      const double a = flat[static_cast<std::size_t>(v)].x(), level = sheet[static_cast<std::size_t>(v)];
+      Vector2d at = section.point(a);
+      if (level > 0) {
+        const ConvexSection& curve = outer.try_emplace(level, hull, spare(start.flattening.depth) + kSheet * level, axis, Vector2d(1, 0)).first->second;
+        const double centre = middle[p] / count[p];
+        at = curve.point(section.facing(centre, curve) + a - centre);
+      }
       start.x.row(v) << at.y(), flat[static_cast<std::size_t>(v)].y(), at.x();
     }
   }
@@ -231,7 +327,9 @@ Result<Start> bend(const mesh::GarmentMesh& garment, const mesh::SupportMesh& su
         }
         if (!nearest) continue;
         std::vector<int> panels;
-        const double width = width_at(garment, layout, flat, part, h, &panels);
+        // The widest within a hand's breadth: hems slant, and the panels of one tube need not end at the same height.
+        double width = 0;
+        for (const double off : {0.0, -0.02, 0.02}) width = std::max(width, width_at(garment, layout, flat, part, h + off, &panels));
         const double needed = nearest->girth + 2 * std::numbers::pi * params.clearance;
         if (needed / std::max(width, 1e-6) > std::max(1 + kNarrow, worst)) {
           worst = needed / std::max(width, 1e-6);
@@ -240,9 +338,9 @@ Result<Start> bend(const mesh::GarmentMesh& garment, const mesh::SupportMesh& su
       }
       if (narrow) issues.push_back(*narrow);
     }
-    const auto tube = [&](const Vector2d& p, double along) {
+    const auto tube = [&](const Vector2d& p, double along, double level) {
       const double angle = turn + p.x() / radius;
-      return Vector3d(origin + radius * (std::cos(angle) * top + std::sin(angle) * across) + (p.y() + along) * up);
+      return Vector3d(origin + (radius + kSheet * level) * (std::cos(angle) * top + std::sin(angle) * across) + (p.y() + along) * up);
     };
     // Outwards until no vertex of a trunk panel lies in the tube's wall (within a margin).
     const double margin = kSleeveGap + 0.012;
@@ -264,7 +362,7 @@ Result<Start> bend(const mesh::GarmentMesh& garment, const mesh::SupportMesh& su
       }
       if (edge > -1e8) needed = std::min(needed, along - margin - edge);
     }
-    for (const Eigen::Index v : members) start.x.row(v) = tube(flat[static_cast<std::size_t>(v)], needed).transpose();
+    for (const Eigen::Index v : members) start.x.row(v) = tube(flat[static_cast<std::size_t>(v)], needed, sheet[static_cast<std::size_t>(v)]).transpose();
   }
   if (!issues.empty()) return issues;
   return start;
@@ -317,10 +415,13 @@ Report measure(const mesh::GarmentMesh& garment, const mesh::SupportMesh& suppor
   return report;
 }
 
-Result<Placed> place(const mesh::GarmentMesh& garment, const mesh::SupportMesh& support, const PlaceParams& params, const std::function<void(double)>& progress) {
+Result<Placed> place(const mesh::GarmentMesh& sewn, const mesh::SupportMesh& support, const PlaceParams& params, const std::function<void(double)>& progress) {
+  const std::vector<int> stuck = stuck_folds(sewn);
+  const mesh::GarmentMesh garment = without_folds(sewn, stuck);
   TOILE_TRY(const BodyFrame frame, body_frame(support));
-  TOILE_TRY(const Layout layout, make_layout(garment, support, frame, params));
-  TOILE_TRY(const Start start, bend(garment, support, frame, layout, params));
+  const FoldedFlat folded_flat = fold_flat(garment);
+  TOILE_TRY(const Layout layout, make_layout(garment, folded_flat, support, frame, params));
+  TOILE_TRY(const Start start, bend(garment, folded_flat, frame, layout, params));
   RelaxOptions options;
   options.offset = params.offset;
   options.clearance = params.clearance;
@@ -338,19 +439,56 @@ Result<Placed> place(const mesh::GarmentMesh& garment, const mesh::SupportMesh& 
     if (progress) progress(0.5 * f);
   };
   Placed placed;
-  placed.garment = garment;
+  placed.garment = sewn;
+  for (int fold : stuck) {
+    placed.warnings.push_back({.code = "fold_not_turned", .place = {.item = "fold " + sewn.folds[static_cast<std::size_t>(fold)].name},
+                               .what = "its line curves round the part that turns: without stretching the cloth it cannot be folded back; it is placed flat",
+                               .remedy = "the simulation turns it, or straighten the line"});
+  }
   // Large folds on a coarse mesh, where they are cheap; then the fine one needs to lose the creases between coarse
   // triangles only.
   // A mesh of about the coarse size is its own coarse mesh: thinning it a little only spoils its triangles.
   double cell = 0;
   for (const mesh::Panel& panel : garment.panels) cell = std::max({cell, panel.cell_warp, panel.cell_weft});
+  std::vector<char> first(garment.panels.size());
+  for (std::size_t p = 0; p < first.size(); ++p) first[p] = layout.panels[p].part != Part::attached;
+  // First the tubes while the support swells in them, then what stands on them.
+  // Cloth that is rolled or folded already needs no further work to stay so; a garment without either keeps to flat.
+  const bool shaped = std::any_of(layout.panels.begin(), layout.panels.end(), [](const PanelLayout& p) { return p.part == Part::attached; }) ||
+                      !fold_lines(garment).empty();
+  const auto rolled_of = [&](const Points3& x) { return shaped ? x : Points3(); };
+  const auto assemble = [&](const mesh::GarmentMesh& mesh, const FoldedFlat& flat, const Points3& bent) {
+    RelaxOptions stage = options;
+    stage.rolled = rolled_of(bent);
+    if (std::find(first.begin(), first.end(), 0) == first.end()) return relax(mesh, bent, support, stage);
+    const Subset tubes = take(mesh, first);
+    stage.rolled = rolled_of(tubes.restricted(bent));
+    stage.settling_steps = stage.polishing_steps = 0;
+    Points3 x = tubes.merged(relax(tubes.mesh, tubes.restricted(bent), support, stage), bent);
+    x = attach(mesh, flat, layout, x, support, params.offset);
+    stage = options;
+    stage.rolled = rolled_of(x);
+    stage.flattening.depth = 1;
+    stage.swelling_steps = 0;
+    return relax(mesh, x, support, stage);
+  };
   Points3 folded;
   if (params.coarse > 1.25 * cell) {
     const CoarseGarment coarse = coarsen(garment, params.coarse);
-    folded = coarse.prolonged(relax(coarse.mesh, coarse.restricted(start.x), support, options));
+    FoldedFlat flat;
+    flat.uv.resize(static_cast<Eigen::Index>(coarse.fine_of.size()), 2);
+    for (std::size_t i = 0; i < coarse.fine_of.size(); ++i) {
+      flat.uv.row(static_cast<Eigen::Index>(i)) = folded_flat.uv.row(coarse.fine_of[i]);
+      flat.layer.push_back(folded_flat.layer[static_cast<std::size_t>(coarse.fine_of[i])]);
+    }
+    folded = coarse.prolonged(assemble(coarse.mesh, flat, coarse.restricted(start.x)));
   } else {
-    folded = relax(garment, start.x, support, options);
+    folded = assemble(garment, folded_flat, start.x);
   }
+  // A fine triangle that lies across an edge of the coarse mesh cuts its corner: sheets near one another may come through.
+  const contact::Surface cloth = contact::make_surface(static_cast<int>(folded.rows()), garment.faces, mesh::particles(garment));
+  if (!contact::self_intersections(cloth, folded).empty()) folded = contact::untangle(cloth, folded).x;
+  if (shaped) options.rolled = start.x;
   options.flattening.depth = 1;
   options.closing_steps = 0;
   options.swelling_steps = 0;

@@ -45,6 +45,8 @@ class ConvexSection {
   Eigen::Vector2d point(double s) const;
   /// Unit normal to the outside at s.
   Eigen::Vector2d normal(double s) const;
+  /// Arc length on another parallel curve of the same polygon, both at a distance > 0, of the point that faces the one at s.
+  double facing(double s, const ConvexSection& other) const;
 
  private:
   struct Piece {

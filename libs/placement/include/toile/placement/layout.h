@@ -5,6 +5,7 @@
 #include "toile/base/result.h"
 #include "toile/mesh/garment_mesh.h"
 #include "toile/placement/body_frame.h"
+#include "toile/placement/folds.h"
 #include "toile/placement/params.h"
 
 #include <Eigen/Core>
@@ -13,7 +14,7 @@
 
 namespace toile::placement {
 
-enum class Part { trunk, arm_left, arm_right };
+enum class Part { trunk, arm_left, arm_right, attached };
 
 /// Rigid motion of a panel into the unrolled tube of its part: a [m] runs round it (from the front to the body's left on
 /// the trunk), h [m] along it (up on the trunk, inwards to the shoulder on an arm).
@@ -34,6 +35,6 @@ struct Layout {
 
 /// error  Issues "no_region" (panels whose part of the support is not known), "unknown_panel" (a setting for a panel
 ///        that is not there), "no_arm", "unknown_anchor"
-Result<Layout> make_layout(const mesh::GarmentMesh& garment, const mesh::SupportMesh& support, const BodyFrame& frame, const PlaceParams& params);
+Result<Layout> make_layout(const mesh::GarmentMesh& garment, const FoldedFlat& flat, const mesh::SupportMesh& support, const BodyFrame& frame, const PlaceParams& params);
 
 }  // namespace toile::placement

@@ -23,6 +23,7 @@ enum class Region {
   arm,          ///< round the arm that its seams to the trunk's panels say
   arm_left,
   arm_right,
+  attached,  ///< stands on its seams to panels that are placed before it (collars, hoods)
 };
 
 }  // namespace toile::placement
@@ -34,7 +35,7 @@ struct toile::Choices<toile::placement::Region> {
       std::pair{"auto", R::automatic},         std::pair{"torso_front", R::torso_front}, std::pair{"torso_back", R::torso_back},
       std::pair{"torso_left", R::torso_left},  std::pair{"torso_right", R::torso_right}, std::pair{"torso", R::torso},
       std::pair{"waist", R::waist},            std::pair{"arm", R::arm},                 std::pair{"arm_left", R::arm_left},
-      std::pair{"arm_right", R::arm_right}};
+      std::pair{"arm_right", R::arm_right},    std::pair{"attached", R::attached}};
 };
 
 namespace toile::placement {

@@ -35,6 +35,7 @@ struct Placed {
   mesh::GarmentMesh garment;
   Report report;
   Issues findings;  ///< checks that failed (Category::check)
+  Issues warnings;  ///< what was left to the simulation
 };
 
 /// error  what make_layout refuses; "too_narrow" for panels that cannot go round their part of the support
@@ -46,7 +47,7 @@ struct Start {
   Points3 x;
   Flattening flattening;  ///< of the support that the panels were bent around
 };
-Result<Start> bend(const mesh::GarmentMesh& garment, const mesh::SupportMesh& support, const BodyFrame& frame, const Layout& layout, const PlaceParams& params);
+Result<Start> bend(const mesh::GarmentMesh& garment, const FoldedFlat& folded, const BodyFrame& frame, const Layout& layout, const PlaceParams& params);
 
 Report measure(const mesh::GarmentMesh& garment, const mesh::SupportMesh& support);
 

@@ -27,6 +27,7 @@ struct RelaxOptions {
   double rms_strain = 0.0008;  ///< and root mean square [1]
   double seam = 0.05;          ///< part of a seam's gap that one sweep closes
   double bending = 0.1;        ///< part of a curvature that one sweep takes out, until polishing
+  Points3 rolled;              ///< |V| x 3 or empty: bending up to the curvature there is free [m]
   std::function<void(double)> progress;  ///< called with 0..1 if given
 };
 
