@@ -114,6 +114,79 @@ inline mesh::GarmentMesh sheet(int columns, int rows, double width, double heigh
   return g;
 }
 
+/// Triangulations of a rectangle that mechanics must not depend on.
+enum class Net { alternating, single, random_diagonals, jittered, delaunay };
+inline const char* name_of(Net net) {
+  switch (net) {
+    case Net::alternating: return "alternating";
+    case Net::single: return "single";
+    case Net::random_diagonals: return "random diagonals";
+    case Net::jittered: return "jittered";
+    case Net::delaunay: return "delaunay";
+  }
+  return "";
+}
+
+/// A sheet like sheet(), with nodes inside moved by up to a quarter of a cell (jittered) or a third with Delaunay triangles, on the border
+/// along it. `place` maps panel coordinates to space.
+inline mesh::GarmentMesh net(Net kind, int columns, int rows, double width, double height, const fabric::Card& card, const std::function<Eigen::Vector3d(double, double)>& place,
+                             std::uint64_t seed = 1) {
+  mesh::GarmentMesh g = sheet(columns, rows, width, height, card, place, kind == Net::single ? Diagonals::single : Diagonals::alternating);
+  std::uint64_t state = seed;
+  const auto noise = [&] {
+    state = state * 6364136223846793005ULL + 1442695040888963407ULL;
+    return static_cast<double>(state >> 11) / 4503599627370496.0 - 1;
+  };
+  if (kind == Net::alternating || kind == Net::single) return g;
+  const double jitter = kind == Net::jittered ? 0.25 : kind == Net::delaunay ? 0.33 : 0;
+  for (int j = 0; j <= rows; ++j) {
+    for (int i = 0; i <= columns; ++i) {
+      const int v = j * (columns + 1) + i;
+      const double du = jitter * noise() * width / columns, dv = jitter * noise() * height / rows;
+      if (i > 0 && i < columns) g.uv(v, 0) += du;
+      if (j > 0 && j < rows) g.uv(v, 1) += dv;
+    }
+  }
+  for (int f = 0; f < g.face_count(); f += 2) {
+    const int cell = f / 2, i = cell % columns, j = cell / columns, a = j * (columns + 1) + i, b = a + 1, d = a + columns + 1, c = d + 1;
+    if (noise() > 0) {
+      g.faces.row(f) << a, b, c;
+      g.faces.row(f + 1) << a, c, d;
+    } else {
+      g.faces.row(f) << a, b, d;
+      g.faces.row(f + 1) << b, c, d;
+    }
+  }
+  // Lawson's flips until every inner edge is Delaunay.
+  for (bool again = kind == Net::delaunay; again;) {
+    again = false;
+    for (int f = 0; f < g.face_count(); ++f) {
+      for (int h = f + 1; h < g.face_count(); ++h) {
+        for (int k = 0; k < 3; ++k) {
+          const int a = g.faces(f, k), b = g.faces(f, (k + 1) % 3), c = g.faces(f, (k + 2) % 3);
+          int m = -1;
+          for (int n = 0; n < 3; ++n) {
+            if (g.faces(h, n) == b && g.faces(h, (n + 1) % 3) == a) m = n;
+          }
+          if (m < 0) continue;
+          const int d = g.faces(h, (m + 2) % 3);
+          const auto angle = [&](int o, int p, int q) {
+            const Eigen::Vector2d x = (g.uv.row(p) - g.uv.row(o)).transpose(), y = (g.uv.row(q) - g.uv.row(o)).transpose();
+            return std::acos(x.dot(y) / (x.norm() * y.norm()));
+          };
+          if (angle(c, a, b) + angle(d, a, b) <= M_PI + 1e-9) continue;
+          g.faces.row(f) << c, a, d;
+          g.faces.row(h) << d, b, c;
+          again = true;
+          break;
+        }
+      }
+    }
+  }
+  for (Eigen::Index v = 0; v < g.vertex_count(); ++v) g.x.row(v) = place(g.uv(v, 0), g.uv(v, 1)).transpose();
+  return g;
+}
+
 /// Latitude-longitude ellipsoid, closed, outward.
 inline mesh::SupportMesh ellipsoid(const Eigen::Vector3d& axes, const Eigen::Vector3d& centre, int rings, int segments) {
   mesh::SupportMesh s;

@@ -6,6 +6,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
+#include <functional>
 #include <numeric>
 
 namespace toile::mechanics {
@@ -201,27 +202,97 @@ struct BendingCase {
   const char* name;
   double uu, vv, uv;  // second derivatives of the height
 };
+constexpr std::array bending_cases{BendingCase{"weft", 1, 0, 0}, BendingCase{"warp", 0, 1, 0}, BendingCase{"twist", 0, 0, 1}, BendingCase{"saddle", 1, -1, 0},
+                                   BendingCase{"30 degrees", 0.75, 0.25, 0.4330127018922193}, BendingCase{"45 degrees", 0.5, 0.5, 0.5}};
+constexpr std::array nets{fixtures::Net::alternating, fixtures::Net::single, fixtures::Net::random_diagonals, fixtures::Net::jittered, fixtures::Net::delaunay};
 
-/// Energy for a height with constant second derivatives, over the exact value, apart from what borders leave out.
-TEST(Sheet, BendingEnergyOfQuadraticSurfacesIsExactInside) {
+/// Points of the cloth and of its directors for a surface over panel coordinates with its two tangents.
+Points3 on_surface(const Sheet& sheet, const GarmentMesh& g, const std::function<std::array<Eigen::Vector3d, 3>(double, double)>& surface) {
+  Points3 x(sheet.node_count, 3);
+  for (Eigen::Index v = 0; v < g.vertex_count(); ++v) x.row(sheet.node_of_vertex[v]) = surface(g.uv(v, 0), g.uv(v, 1))[0].transpose();
+  for (const Director& d : sheet.directors) {
+    const auto at = surface(g.uv(d.vertex, 0), g.uv(d.vertex, 1));
+    x.row(d.ghost_u) = (at[0] + d.length * at[1]).transpose();
+    x.row(d.ghost_v) = (at[0] + d.length * at[2]).transpose();
+  }
+  return x;
+}
+
+/// Patch test: the border and its tangent planes are held on a quadratic surface, so nothing is left out there.
+TEST(Sheet, BendingEnergyOfQuadraticSurfacesIsExactOnAnyMesh) {
   fabric::Card card = shirting();
   card.twist_ratio = 0.3;
   const double d11 = card.weft.bending, d22 = card.warp.bending, d66 = 0.3 * std::sqrt(d11 * d22);
-  for (const auto diagonals : {fixtures::Diagonals::alternating, fixtures::Diagonals::single}) {
-    for (const BendingCase& c : {BendingCase{"weft", 1, 0, 0}, {"warp", 0, 1, 0}, {"twist", 0, 0, 1}, {"saddle", 1, -1, 0}, {"30 degrees", 0.75, 0.25, 0.4330127018922193}}) {
-      const auto surface = [&](double u, double v) { return Eigen::Vector3d(u, v, 0.5 * (c.uu * u * u + c.vv * v * v + 2 * c.uv * u * v)); };
-      // The energy of a large sheet minus what a border of fixed width adds: doubling the sheet separates the two.
-      std::array<double, 2> total{};
-      for (int k = 0; k < 2; ++k) {
-        const int n = 10 * (k + 1);
-        const GarmentMesh g = fixtures::sheet(n, n, 0.01 * n, 0.01 * n, card, surface, diagonals);
-        total[static_cast<std::size_t>(k)] = energy(make(g), g.x, Points3(0, 3)).bending;
-      }
-      const double exact = 0.5 * (d11 * c.uu * c.uu + d22 * c.vv * c.vv + 4 * d66 * c.uv * c.uv);
-      // total = exact n^2 + border n + corners; corners are the same in both, so two sizes bound the error by a corner cell.
-      const double inside = (total[1] - 2 * total[0]) / (0.04 - 2 * 0.01);
-      EXPECT_NEAR(inside / exact, 1, 1e-6) << c.name;
+  for (const fixtures::Net net : nets) {
+    const GarmentMesh g = fixtures::net(net, 12, 9, 0.12, 0.09, card, flat);
+    SheetOptions options;
+    for (int v = 0; v < g.vertex_count(); ++v) {
+      const double u = g.uv(v, 0), w = g.uv(v, 1);
+      if (std::min({u, w, 0.12 - u, 0.09 - w}) < 1e-9) options.directed_vertices.push_back(v);
     }
+    const Sheet sheet = make(g, options);
+    for (const BendingCase& c : bending_cases) {
+      const Points3 x = on_surface(sheet, g, [&](double u, double v) {
+        return std::array<Eigen::Vector3d, 3>{Eigen::Vector3d(u, v, 0.5 * (c.uu * u * u + c.vv * v * v + 2 * c.uv * u * v)), Eigen::Vector3d(1, 0, c.uu * u + c.uv * v),
+                                              Eigen::Vector3d(0, 1, c.vv * v + c.uv * u)};
+      });
+      const double exact = 0.5 * (d11 * c.uu * c.uu + d22 * c.vv * c.vv + 4 * d66 * c.uv * c.uv) * 0.12 * 0.09;
+      EXPECT_NEAR(energy(sheet, x, Points3(0, 3)).bending / exact, 1, 1e-8) << fixtures::name_of(net) << ", " << c.name;
+      // And it is in balance: no force from bending at nodes that are neither on the border nor next to a director.
+      double worst = 0;
+      for (int i = 0; i < sheet.cloth_nodes; ++i) {
+        if (std::find(options.directed_vertices.begin(), options.directed_vertices.end(), i) != options.directed_vertices.end()) continue;
+        double force = 0;
+        for (int k = sheet.bending.row_start[static_cast<std::size_t>(i)]; k < sheet.bending.row_start[static_cast<std::size_t>(i) + 1]; ++k) {
+          force += sheet.bending.value[static_cast<std::size_t>(k)] * x(sheet.bending.column[static_cast<std::size_t>(k)], 2);
+        }
+        worst = std::max(worst, std::abs(force));
+      }
+      EXPECT_LT(worst, 1e-9 * d11) << fixtures::name_of(net) << ", " << c.name;
+    }
+  }
+}
+
+/// A cylinder of finite curvature at any angle to the yarns, and turned in space.
+TEST(Sheet, BendingEnergyOfACylinderIsThatOfItsCurvature) {
+  fabric::Card card = shirting();
+  card.twist_ratio = 0.3;
+  const double d11 = card.weft.bending, d22 = card.warp.bending, d66 = 0.3 * std::sqrt(d11 * d22), radius = 0.04;
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(1.1, Eigen::Vector3d(1, 2, -0.5).normalized()).toRotationMatrix();
+  for (const fixtures::Net net : nets) {
+    for (double degrees : {0.0, 30.0, 45.0, 90.0}) {
+      double previous = 1;
+      for (int n : {12, 24}) {
+        const GarmentMesh g = fixtures::net(net, n, n, 0.06, 0.06, card, flat);
+        SheetOptions options;
+        for (int v = 0; v < g.vertex_count(); ++v) {
+          const double u = g.uv(v, 0), w = g.uv(v, 1);
+          if (std::min({u, w, 0.06 - u, 0.06 - w}) < 1e-9) options.directed_vertices.push_back(v);
+        }
+        const Sheet sheet = make(g, options);
+        const double a = degrees * M_PI / 180, c = std::cos(a), s = std::sin(a);
+        const Points3 x = on_surface(sheet, g, [&](double u, double v) {
+          const double along = c * u + s * v, across = -s * u + c * v, phi = along / radius;
+          const Eigen::Vector3d p(radius * std::sin(phi), across, radius * (1 - std::cos(phi))), t(std::cos(phi), 0, std::sin(phi)), q(0, 1, 0);
+          return std::array<Eigen::Vector3d, 3>{turn * p, turn * (c * t - s * q), turn * (s * t + c * q)};
+        });
+        const double exact = 0.5 * (d11 * std::pow(c, 4) + d22 * std::pow(s, 4) + 4 * d66 * c * c * s * s) / (radius * radius) * 0.06 * 0.06;
+        const double error = std::abs(energy(sheet, x, Points3(0, 3)).bending / exact - 1);
+        EXPECT_LT(error, n == 12 ? 0.005 : 0.0015) << fixtures::name_of(net) << ", " << degrees << " degrees, " << n;
+        EXPECT_LT(error, 0.4 * previous) << "second order";
+        previous = error;
+      }
+    }
+  }
+}
+
+TEST(Sheet, FreeBordersCarryNoMomentAcrossThem) {
+  // A cylinder whose axis runs along the border bends with all of it; one whose axis runs across loses half a cell at either end.
+  const fabric::Card card = shirting();
+  for (const fixtures::Net net : nets) {
+    const GarmentMesh g = fixtures::net(net, 30, 10, 0.3, 0.1, card, [](double u, double v) { return Eigen::Vector3d(u, v, 0.5 * u * u); });
+    const double ratio = energy(make(g), g.x, Points3(0, 3)).bending / (0.5 * card.weft.bending * 0.3 * 0.1);
+    EXPECT_NEAR(ratio, 1 - 1.0 / 30, 0.01) << fixtures::name_of(net);
   }
 }
 

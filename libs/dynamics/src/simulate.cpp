@@ -25,8 +25,10 @@ using mesh::SupportMesh;
 constexpr std::size_t grain = 1024;
 const Points3 no_points(0, 3);
 // A step may raise the energy by the garment's weight times this [m]: turning cloth by a finite angle stretches it a
-// little, the next iteration takes that back; forbidding it makes the steps several times shorter.
+// little, the next iteration takes that back; forbidding it makes the steps several times shorter. The energy of that stretch
+// goes with the fourth power of the move, so below `slack_move` the slack does too: with more, two states could take turns for ever.
 constexpr double energy_slack = 1e-3;
+constexpr double slack_move = 1e-3;  // [m]
 constexpr double solver_tolerance = 0.02;
 constexpr int solver_iterations_max = 300;
 // Relaxation: part of the last move that the next step starts with (until the energy rises), and the step's control.
@@ -314,7 +316,8 @@ bool Run::iterate(double step) {
     const Points3 candidate = alpha == 1 ? reached : Points3(from + alpha * (reached - from));
     evaluate(candidate, true);
     const double after = energy_ + inertia_energy(candidate);
-    if (after <= before + slack_ * weight_ || trial == 5) {
+    const double part = std::min(1.0, alpha * scale * largest / slack_move);
+    if (after <= before + slack_ * part * part * part * part * weight_ || trial == 5) {
       x_ = candidate;
       moved = true;
       break;

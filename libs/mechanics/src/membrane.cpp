@@ -54,9 +54,19 @@ double membrane_energy(const fabric::Constitutive& fabric, const YarnGradient& g
   return fabric.weft.at(f.weft_length - 1).energy + fabric.warp.at(f.warp_length - 1).energy + fabric.shear.at(f.sine).energy;
 }
 
-MembraneResponse membrane_response(const fabric::Constitutive& fabric, const YarnGradient& gradient, Curvature curvature) {
+YarnState yarn_state(const YarnGradient& gradient) {
   const Frame f = frame_of(gradient);
-  const fabric::CurvePoint weft = fabric.weft.at(f.weft_length - 1), warp = fabric.warp.at(f.warp_length - 1), shear = fabric.shear.at(f.sine);
+  return {f.weft_length, f.warp_length, f.sine};
+}
+
+MembraneResponse membrane_response(const fabric::Constitutive& fabric, const YarnGradient& gradient, Curvature curvature) {
+  const YarnState s = yarn_state(gradient);
+  return membrane_response(fabric.weft.at(s.weft - 1), fabric.warp.at(s.warp - 1), fabric.shear.at(s.sine), gradient, curvature);
+}
+
+MembraneResponse membrane_response(const fabric::CurvePoint& weft, const fabric::CurvePoint& warp, const fabric::CurvePoint& shear, const YarnGradient& gradient,
+                                   Curvature curvature) {
+  const Frame f = frame_of(gradient);
   const double l1 = f.weft_length, l2 = f.warp_length, s = f.sine;
   MembraneResponse r;
   r.energy = weft.energy + warp.energy + shear.energy;

@@ -1,8 +1,11 @@
 #include "toile/mechanics/sheet.h"
 
+#include "bending.h"
+
 #include "toile/base/parallel.h"
 #include "toile/mesh/topology.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -12,208 +15,51 @@ namespace toile::mechanics {
 namespace {
 
 constexpr std::size_t grain = 1024;
+// Part of a pair's stretch energy that either face keeps for itself, so that opposite stretches in the two are not free.
+constexpr double own_part = 0.1;
 
 struct Triplet {
   int row, column;
   double value;
 };
 
-ScalarMatrix compress(int rows, std::vector<Triplet>& triplets) {
-  std::stable_sort(triplets.begin(), triplets.end(), [](const Triplet& p, const Triplet& q) { return std::tie(p.row, p.column) < std::tie(q.row, q.column); });
-  ScalarMatrix matrix;
-  matrix.row_start.assign(static_cast<std::size_t>(rows) + 1, 0);
-  int row = -1;
-  for (const Triplet& t : triplets) {
-    if (t.row == row && matrix.column.back() == t.column) {
-      matrix.value.back() += t.value;
-      continue;
+/// Sums triplets of the same place in the order in which they come.
+ScalarMatrix compress(int rows, const std::vector<Triplet>& triplets) {
+  const auto n = static_cast<std::size_t>(rows);
+  std::vector<std::size_t> start(n + 1, 0);
+  for (const Triplet& t : triplets) ++start[static_cast<std::size_t>(t.row) + 1];
+  for (std::size_t i = 1; i <= n; ++i) start[i] += start[i - 1];
+  std::vector<std::pair<int, double>> sorted(triplets.size());
+  std::vector<std::size_t> next(start.begin(), start.end() - 1);
+  for (const Triplet& t : triplets) sorted[next[static_cast<std::size_t>(t.row)]++] = {t.column, t.value};
+  std::vector<int> count(n, 0);
+  parallel_for(n, grain, [&](std::size_t i) {
+    const auto begin = sorted.begin() + static_cast<std::ptrdiff_t>(start[i]), end = sorted.begin() + static_cast<std::ptrdiff_t>(start[i + 1]);
+    std::stable_sort(begin, end, [](const auto& p, const auto& q) { return p.first < q.first; });
+    auto out = begin;
+    for (auto it = begin; it != end; ++it) {
+      if (it != begin && it->first == (out - 1)->first) {
+        (out - 1)->second += it->second;
+      } else {
+        *out++ = *it;
+      }
     }
-    row = t.row;
-    matrix.column.push_back(t.column);
-    matrix.value.push_back(t.value);
-    ++matrix.row_start[static_cast<std::size_t>(t.row) + 1];
+    count[i] = static_cast<int>(out - begin);
+  });
+  ScalarMatrix matrix;
+  matrix.row_start.assign(n + 1, 0);
+  for (std::size_t i = 0; i < n; ++i) {
+    matrix.row_start[i + 1] = matrix.row_start[i] + count[i];
+    for (int k = 0; k < count[i]; ++k) {
+      matrix.column.push_back(sorted[start[i] + static_cast<std::size_t>(k)].first);
+      matrix.value.push_back(sorted[start[i] + static_cast<std::size_t>(k)].second);
+    }
   }
-  for (std::size_t i = 1; i < matrix.row_start.size(); ++i) matrix.row_start[i] += matrix.row_start[i - 1];
   return matrix;
-}
-
-/// Outward derivative across edge k (corner k to k+1) of a triangle, as coefficients of its corners [1/m]; and the edge's
-/// length and outward normal in the panel's coordinates.
-struct Conormal {
-  std::array<double, 3> slope;
-  double length;
-  Eigen::Vector2d normal;
-};
-
-Conormal conormal(const TriangleShape& shape, const std::array<Eigen::Vector2d, 3>& uv, int k) {
-  const Eigen::Vector2d edge = uv[static_cast<std::size_t>((k + 1) % 3)] - uv[static_cast<std::size_t>(k)];
-  Conormal result;
-  result.length = edge.norm();
-  result.normal = Eigen::Vector2d(edge.y(), -edge.x()) / result.length;
-  for (std::size_t c = 0; c < 3; ++c) result.slope[c] = shape.slope_u[c] * result.normal.x() + shape.slope_v[c] * result.normal.y();
-  return result;
 }
 
 std::array<Eigen::Vector2d, 3> corners_uv(const mesh::GarmentMesh& garment, Eigen::Index f) {
   return {garment.uv.row(garment.faces(f, 0)).transpose(), garment.uv.row(garment.faces(f, 1)).transpose(), garment.uv.row(garment.faces(f, 2)).transpose()};
-}
-
-/// weight/2 |sum_i coefficient_i x_(node_i)|^2 as contributions to the matrix.
-void add_square(const std::vector<std::pair<int, double>>& form, double weight, std::vector<Triplet>& triplets) {
-  for (const auto& [i, p] : form) {
-    for (const auto& [j, q] : form) triplets.push_back({i, j, weight * p * q});
-  }
-}
-
-/// Bending of rectangular grid cells by second differences along the yarns at their corners and the twist of the cell.
-/// Returns which faces are done that way: both halves of a rectangle along the yarns whose corners are free of seams and either
-/// inside the grid or on a border along a yarn (there the moment across the border vanishes and needs no term).
-std::vector<char> grid_bending_triplets(const mesh::GarmentMesh& garment, const Sheet& sheet, std::vector<Triplet>& triplets) {
-  const auto nv = static_cast<std::size_t>(garment.vertex_count());
-  std::vector<char> done(sheet.corners.size(), 0);
-  std::vector<int> sharing(static_cast<std::size_t>(sheet.node_count), 0);
-  for (Eigen::Index v = 0; v < garment.vertex_count(); ++v) ++sharing[static_cast<std::size_t>(sheet.node_of_vertex[v])];
-  std::vector<double> angle(nv, 0);
-  for (Eigen::Index f = 0; f < garment.face_count(); ++f) {
-    for (int k = 0; k < 3; ++k) {
-      const Eigen::RowVector2d o = garment.uv.row(garment.faces(f, k));
-      const Eigen::RowVector2d p = garment.uv.row(garment.faces(f, (k + 1) % 3)) - o, q = garment.uv.row(garment.faces(f, (k + 2) % 3)) - o;
-      angle[static_cast<std::size_t>(garment.faces(f, k))] += std::atan2(std::abs(p.x() * q.y() - p.y() * q.x()), p.dot(q));
-    }
-  }
-  constexpr double aligned = 1e-6;
-  // Neighbours along +u, -u, +v, -v.
-  std::vector<std::array<int, 4>> next(nv, {-1, -1, -1, -1});
-  const std::vector<mesh::Edge> edges = mesh::edges(garment.faces);
-  for (const mesh::Edge& edge : edges) {
-    const Eigen::RowVector2d d = garment.uv.row(edge.b) - garment.uv.row(edge.a);
-    const auto a = static_cast<std::size_t>(edge.a), b = static_cast<std::size_t>(edge.b);
-    if (std::abs(d.y()) < aligned * std::abs(d.x())) {
-      next[a][d.x() > 0 ? 0 : 1] = edge.b;
-      next[b][d.x() > 0 ? 1 : 0] = edge.a;
-    } else if (std::abs(d.x()) < aligned * std::abs(d.y())) {
-      next[a][d.y() > 0 ? 2 : 3] = edge.b;
-      next[b][d.y() > 0 ? 3 : 2] = edge.a;
-    }
-  }
-  const auto regular = [&](int vertex) {
-    const auto v = static_cast<std::size_t>(vertex);
-    if (sharing[static_cast<std::size_t>(sheet.node_of_vertex[vertex])] != 1) return false;
-    const double quarters = angle[v] / (0.5 * M_PI);
-    const auto whole = static_cast<int>(std::lround(quarters));
-    if (std::abs(quarters - whole) > 1e-6 || whole == 3) return false;
-    const auto count = static_cast<int>(std::count_if(next[v].begin(), next[v].end(), [](int n) { return n >= 0; }));
-    return count == (whole == 4 ? 4 : whole + 1);
-  };
-  const auto node = [&](int vertex) { return sheet.node_of_vertex[vertex]; };
-  for (const mesh::Edge& edge : edges) {
-    if (edge.faces.size() != 2) continue;
-    const auto f = static_cast<std::size_t>(edge.faces[0]), g = static_cast<std::size_t>(edge.faces[1]);
-    if (sheet.fabric_of_face[f] != sheet.fabric_of_face[g]) continue;
-    const auto opposite = [&](int face) {
-      for (int k = 0; k < 3; ++k) {
-        const int v = garment.faces(face, k);
-        if (v != edge.a && v != edge.b) return v;
-      }
-      return -1;
-    };
-    const int c = opposite(edge.faces[0]), d = opposite(edge.faces[1]);
-    const Eigen::RowVector2d a = garment.uv.row(edge.a), b = garment.uv.row(edge.b), size = (b - a).cwiseAbs();
-    const double tolerance = aligned * size.maxCoeff();
-    if (size.minCoeff() < 0.05 * size.maxCoeff()) continue;
-    const auto at = [&](int v, double u, double w) { return (garment.uv.row(v) - Eigen::RowVector2d(u, w)).norm() < tolerance; };
-    if (!((at(c, a.x(), b.y()) && at(d, b.x(), a.y())) || (at(d, a.x(), b.y()) && at(c, b.x(), a.y())))) continue;
-    const std::array<int, 4> corner{edge.a, edge.b, c, d};
-    if (!std::all_of(corner.begin(), corner.end(), regular)) continue;
-    done[f] = done[g] = 1;
-    const double area = size.x() * size.y();
-    const fabric::Constitutive& fabric = sheet.fabrics[static_cast<std::size_t>(sheet.fabric_of_face[f])];
-    for (int v : corner) {
-      for (int axis = 0; axis < 2; ++axis) {
-        const int after = next[static_cast<std::size_t>(v)][static_cast<std::size_t>(2 * axis)], before = next[static_cast<std::size_t>(v)][static_cast<std::size_t>(2 * axis + 1)];
-        if (after < 0 || before < 0) continue;
-        const double p = garment.uv(after, axis) - garment.uv(v, axis), q = garment.uv(v, axis) - garment.uv(before, axis);
-        const double scale = 2 / (p + q);
-        add_square({{node(after), scale / p}, {node(before), scale / q}, {node(v), -scale * (1 / p + 1 / q)}}, 0.25 * area * (axis == 0 ? fabric.bending_weft : fabric.bending_warp), triplets);
-      }
-    }
-    const double twist = 1 / area;
-    add_square({{node(edge.a), twist}, {node(edge.b), twist}, {node(c), -twist}, {node(d), -twist}}, 4 * fabric.bending_twist * area, triplets);
-  }
-  return done;
-}
-
-/// Bending of the other triangles: curvature of a triangle from the jumps of the surface's slope over its
-/// edges, docs/mechanics.md#bending.
-void bending_triplets(const mesh::GarmentMesh& garment, const Sheet& sheet, const std::map<std::pair<int, int>, double>& seam_factor, const std::vector<char>& skip, std::vector<Triplet>& triplets) {
-  mesh::Triangles faces(garment.face_count(), 3);
-  for (Eigen::Index f = 0; f < faces.rows(); ++f) {
-    for (int k = 0; k < 3; ++k) faces(f, k) = sheet.corners[static_cast<std::size_t>(f)][static_cast<std::size_t>(k)];
-  }
-  // Jump terms of each face: edges with neighbours.
-  struct Side {
-    int face, edge;
-  };
-  std::vector<std::vector<std::pair<int, std::vector<Side>>>> neighbours(sheet.corners.size());
-  const auto edge_index = [&](int f, int a, int b) {
-    for (int k = 0; k < 3; ++k) {
-      const int p = faces(f, k), q = faces(f, (k + 1) % 3);
-      if ((p == a && q == b) || (p == b && q == a)) return k;
-    }
-    return -1;
-  };
-  std::map<std::pair<int, int>, double> factors = seam_factor;
-  for (const mesh::Edge& edge : mesh::edges(faces)) {
-    if (edge.faces.size() < 2) continue;
-    std::vector<Side> sides;
-    for (int f : edge.faces) sides.push_back({f, edge_index(f, edge.a, edge.b)});
-    for (std::size_t i = 0; i < sides.size(); ++i) {
-      std::vector<Side> others;
-      for (std::size_t j = 0; j < sides.size(); ++j) {
-        if (j != i) others.push_back(sides[j]);
-      }
-      neighbours[static_cast<std::size_t>(sides[i].face)].push_back({sides[i].edge, std::move(others)});
-    }
-  }
-  for (std::size_t f = 0; f < sheet.corners.size(); ++f) {
-    if (skip[f]) continue;
-    const TriangleShape& shape = sheet.shapes[f];
-    const auto uv = corners_uv(garment, static_cast<Eigen::Index>(f));
-    std::vector<int> nodes(sheet.corners[f].begin(), sheet.corners[f].end());
-    std::vector<std::array<double, 3>> curvature(3, {0, 0, 0});  // K_uu, K_vv, K_uv per node
-    const auto add = [&](int node, double jump, const Conormal& edge, double weight) {
-      std::size_t slot = 0;
-      while (slot < nodes.size() && nodes[slot] != node) ++slot;
-      if (slot == nodes.size()) {
-        nodes.push_back(node);
-        curvature.push_back({0, 0, 0});
-      }
-      const double w = jump * weight * edge.length / (2 * shape.area);
-      curvature[slot][0] += w * edge.normal.x() * edge.normal.x();
-      curvature[slot][1] += w * edge.normal.y() * edge.normal.y();
-      curvature[slot][2] += w * edge.normal.x() * edge.normal.y();
-    };
-    for (const auto& [k, others] : neighbours[f]) {
-      const Conormal own = conormal(shape, uv, k);
-      const int a = sheet.corners[f][static_cast<std::size_t>(k)], b = sheet.corners[f][static_cast<std::size_t>((k + 1) % 3)];
-      const auto factor = factors.find({std::min(a, b), std::max(a, b)});
-      const double weight = factor == factors.end() ? 1.0 : std::sqrt(factor->second);
-      for (std::size_t c = 0; c < 3; ++c) add(sheet.corners[f][c], -own.slope[c], own, weight);
-      for (const Side& side : others) {
-        const auto g = static_cast<std::size_t>(side.face);
-        const Conormal other = conormal(sheet.shapes[g], corners_uv(garment, side.face), side.edge);
-        for (std::size_t c = 0; c < 3; ++c) add(sheet.corners[g][c], -other.slope[c] / static_cast<double>(others.size()), own, weight);
-      }
-    }
-    const fabric::Constitutive& fabric = sheet.fabrics[static_cast<std::size_t>(sheet.fabric_of_face[f])];
-    for (std::size_t i = 0; i < nodes.size(); ++i) {
-      for (std::size_t j = 0; j < nodes.size(); ++j) {
-        const double value = shape.area * (fabric.bending_weft * curvature[i][0] * curvature[j][0] + fabric.bending_warp * curvature[i][1] * curvature[j][1] +
-                                           4 * fabric.bending_twist * curvature[i][2] * curvature[j][2]);
-        triplets.push_back({nodes[i], nodes[j], value});
-      }
-    }
-  }
 }
 
 void bucket(int buckets, const std::vector<int>& key, std::vector<int>& start, std::vector<int>& items) {
@@ -230,6 +76,87 @@ constexpr std::array<std::array<int, 3>, 3> block_slot{{{0, 1, 2}, {1, 3, 4}, {2
 
 Eigen::Vector3d point(const Points3& x, int i) { return x.row(i).transpose(); }
 
+/// Energy of an element with its first two derivatives by the element's number; the number's gradient by node into `gradient`.
+fabric::CurvePoint hinge_state(const HingeElement& hinge, const Points3& x, Eigen::Vector3d* gradient) {
+  const Eigen::Vector3d x0 = point(x, hinge.node[0]), edge = point(x, hinge.node[1]) - x0, to_first = point(x, hinge.node[2]) - x0, to_second = point(x, hinge.node[3]) - x0;
+  const Eigen::Vector3d n0 = edge.cross(to_first), n1 = to_second.cross(edge);
+  const double length = std::max(edge.norm(), 1e-12), sq0 = std::max(n0.squaredNorm(), 1e-24), sq1 = std::max(n1.squaredNorm(), 1e-24);
+  const double angle = std::atan2(n1.cross(n0).dot(edge) / length, n0.dot(n1)) - hinge.rest;
+  if (gradient != nullptr) {
+    const double t0 = to_first.dot(edge) / (length * length), t1 = to_second.dot(edge) / (length * length);
+    gradient[2] = n0 * (length / sq0);
+    gradient[3] = n1 * (length / sq1);
+    gradient[0] = -(1 - t0) * gradient[2] - (1 - t1) * gradient[3];
+    gradient[1] = -t0 * gradient[2] - t1 * gradient[3];
+  }
+  return {0.5 * hinge.stiffness * angle * angle, hinge.stiffness * angle, hinge.stiffness};
+}
+
+/// Faces off the grid, two by two. A triangle that the yarns cross at an angle has two stiff directions for one node in two: a mesh of
+/// them can hardly shear. In pairs there are as many as on the grid.
+std::vector<MembraneUnit> membrane_units(const mesh::GarmentMesh& garment, const std::vector<int>& fabric_of_face, const std::vector<char>& in_cell) {
+  const auto nf = static_cast<std::size_t>(garment.face_count());
+  std::set<std::pair<int, int>> creases;
+  for (const mesh::Hinge& h : garment.hinges) creases.insert({std::min(h.v0, h.v1), std::max(h.v0, h.v1)});
+  struct Neighbour {
+    int face;
+    double length;  // of the edge between
+  };
+  std::vector<std::vector<Neighbour>> around(nf);
+  for (const mesh::Edge& edge : mesh::edges(garment.faces)) {
+    if (edge.faces.size() != 2 || creases.count({edge.a, edge.b}) > 0) continue;
+    const auto f = static_cast<std::size_t>(edge.faces[0]), g = static_cast<std::size_t>(edge.faces[1]);
+    if (in_cell[f] || in_cell[g] || fabric_of_face[f] != fabric_of_face[g]) continue;
+    const double length = (garment.uv.row(edge.a) - garment.uv.row(edge.b)).norm();
+    around[f].push_back({edge.faces[1], length});
+    around[g].push_back({edge.faces[0], length});
+  }
+  // The face with the fewest free neighbours first, with the neighbour that has the fewest.
+  std::vector<int> free(nf), partner(nf, -1);
+  std::set<std::pair<int, int>> queue;
+  for (std::size_t f = 0; f < nf; ++f) {
+    free[f] = static_cast<int>(around[f].size());
+    if (free[f] > 0) queue.insert({free[f], static_cast<int>(f)});
+  }
+  const auto leave = [&](int face) {
+    queue.erase({free[static_cast<std::size_t>(face)], face});
+    for (const Neighbour& n : around[static_cast<std::size_t>(face)]) {
+      int& count = free[static_cast<std::size_t>(n.face)];
+      if (queue.erase({count, n.face}) == 0) continue;
+      if (--count > 0) queue.insert({count, n.face});
+    }
+  };
+  while (!queue.empty()) {
+    const int face = queue.begin()->second;
+    const Neighbour* best = nullptr;
+    for (const Neighbour& n : around[static_cast<std::size_t>(face)]) {
+      if (partner[static_cast<std::size_t>(n.face)] >= 0) continue;
+      const int count = free[static_cast<std::size_t>(n.face)];
+      if (best == nullptr || std::pair(count, -n.length) < std::pair(free[static_cast<std::size_t>(best->face)], -best->length)) best = &n;
+    }
+    TOILE_CHECK(best != nullptr, "face {} has no free neighbour", face);
+    partner[static_cast<std::size_t>(face)] = best->face;
+    partner[static_cast<std::size_t>(best->face)] = face;
+    const int other = best->face;
+    leave(face);
+    leave(other);
+  }
+  std::vector<MembraneUnit> units;
+  for (std::size_t f = 0; f < nf; ++f) {
+    if (partner[f] < 0) units.push_back({static_cast<int>(f)});
+    if (partner[f] > static_cast<int>(f)) units.push_back({static_cast<int>(f), partner[f]});
+  }
+  return units;
+}
+
+/// Both yarns' mean stretch over the two faces of a pair.
+YarnState mean_state(const Sheet& sheet, const MembraneUnit& unit, const YarnState& first, const YarnState& second) {
+  const double a = sheet.shapes[static_cast<std::size_t>(unit.first)].area, b = sheet.shapes[static_cast<std::size_t>(unit.second)].area, w = a / (a + b);
+  return {w * first.weft + (1 - w) * second.weft, w * first.warp + (1 - w) * second.warp, 0};
+}
+
+fabric::CurvePoint scaled(const fabric::CurvePoint& p, double factor) { return {factor * p.energy, factor * p.force, factor * p.slope}; }
+
 }  // namespace
 
 YarnGradient yarn_gradient(const Sheet& sheet, const Points3& x, std::size_t face) {
@@ -244,7 +171,8 @@ Result<Sheet> make_sheet(const mesh::GarmentMesh& garment, const Ids& node_of_ve
   Issues issues;
   Sheet sheet;
   sheet.node_of_vertex = node_of_vertex;
-  sheet.node_count = node_of_vertex.size() == 0 ? 0 : node_of_vertex.maxCoeff() + 1;
+  sheet.cloth_nodes = node_of_vertex.size() == 0 ? 0 : node_of_vertex.maxCoeff() + 1;
+  sheet.node_count = sheet.cloth_nodes + 2 * static_cast<int>(options.directed_vertices.size());
   if (garment.face_count() == 0) return Issue{"empty_garment", {}, "the garment has no faces", "mesh its panels first (toile-mesh)"};
 
   for (const mesh::Laminate& laminate : garment.laminates) {
@@ -310,10 +238,43 @@ Result<Sheet> make_sheet(const mesh::GarmentMesh& garment, const Ids& node_of_ve
     if (a != b) sheet.springs.push_back({a, b, options.fastener_stiffness, fastener.length});
   }
 
+  // Directors: a length of about the cells around keeps their columns of the matrix in proportion.
+  std::vector<double> reach(static_cast<std::size_t>(garment.vertex_count()), 0);
+  for (std::size_t f = 0; f < nf; ++f) {
+    for (int k = 0; k < 3; ++k) reach[static_cast<std::size_t>(garment.faces(static_cast<Eigen::Index>(f), k))] = std::sqrt(sheet.shapes[f].area);
+  }
+  for (int vertex : options.directed_vertices) {
+    const int ghost = sheet.cloth_nodes + 2 * static_cast<int>(sheet.directors.size());
+    const double length = reach[static_cast<std::size_t>(vertex)];
+    sheet.directors.push_back({vertex, node_of_vertex[vertex], ghost, ghost + 1, length > 0 ? length : 1});
+  }
+
+  BendingForms bending = bending_forms(garment, sheet, seam_factor);
+  sheet.hinges = std::move(bending.hinges);
   std::vector<Triplet> triplets;
-  const std::vector<char> on_grid = grid_bending_triplets(garment, sheet, triplets);
-  bending_triplets(garment, sheet, seam_factor, on_grid, triplets);
+  for (const CurvatureForm& c : bending.curvatures) {
+    for (const auto& [i, p] : c.form) {
+      for (const auto& [j, q] : c.form) triplets.push_back({i, j, c.weight * c.rigidity * p * q});
+    }
+  }
   sheet.bending = compress(sheet.node_count, triplets);
+  sheet.element_start.push_back(0);
+  sheet.units = membrane_units(garment, sheet.fabric_of_face, bending.in_cell);
+  for (const HingeElement& hinge : sheet.hinges) {
+    sheet.element_node.insert(sheet.element_node.end(), hinge.node.begin(), hinge.node.end());
+    sheet.element_start.push_back(static_cast<int>(sheet.element_node.size()));
+  }
+  for (MembraneUnit& unit : sheet.units) {
+    if (unit.second < 0) continue;
+    // The corners of both faces: two nodes stand twice, and their entries add up.
+    unit.element = static_cast<int>(sheet.element_start.size()) - 1;
+    for (int yarn = 0; yarn < 2; ++yarn) {
+      for (int f : {unit.first, unit.second}) {
+        for (int n : sheet.corners[static_cast<std::size_t>(f)]) sheet.element_node.push_back(n);
+      }
+      sheet.element_start.push_back(static_cast<int>(sheet.element_node.size()));
+    }
+  }
 
   // The block pattern: bending stencils hold those of the membrane except at lone triangles, so all are joined.
   triplets.clear();
@@ -326,6 +287,11 @@ Result<Sheet> make_sheet(const mesh::GarmentMesh& garment, const Ids& node_of_ve
   for (const auto& corner : sheet.corners) {
     for (int a : corner) {
       for (int b : corner) triplets.push_back({a, b, 0});
+    }
+  }
+  for (std::size_t e = 0; e + 1 < sheet.element_start.size(); ++e) {
+    for (int p = sheet.element_start[e]; p < sheet.element_start[e + 1]; ++p) {
+      for (int q = sheet.element_start[e]; q < sheet.element_start[e + 1]; ++q) triplets.push_back({sheet.element_node[static_cast<std::size_t>(p)], sheet.element_node[static_cast<std::size_t>(q)], 0});
     }
   }
   for (const Link& link : sheet.links) {
@@ -362,6 +328,21 @@ Result<Sheet> make_sheet(const mesh::GarmentMesh& garment, const Ids& node_of_ve
   for (const Link& link : sheet.links) key.insert(key.end(), {link.a, link.b});
   for (const Spring& spring : sheet.springs) key.insert(key.end(), {spring.a, spring.b});
   bucket(sheet.node_count, key, sheet.node_link_start, sheet.node_link);
+  bucket(sheet.node_count, sheet.element_node, sheet.node_entry_start, sheet.node_entry);
+  key.clear();
+  std::vector<std::pair<int, int>> pairs;
+  for (std::size_t e = 0; e + 1 < sheet.element_start.size(); ++e) {
+    for (int p = sheet.element_start[e]; p < sheet.element_start[e + 1]; ++p) {
+      sheet.entry_element.push_back(static_cast<int>(e));
+      for (int q = sheet.element_start[e]; q < sheet.element_start[e + 1]; ++q) {
+        key.push_back(find(sheet.element_node[static_cast<std::size_t>(p)], sheet.element_node[static_cast<std::size_t>(q)]));
+        pairs.emplace_back(p, q);
+      }
+    }
+  }
+  std::vector<int> order;
+  bucket(static_cast<int>(sheet.column.size()), key, sheet.block_pair_start, order);
+  for (int i : order) sheet.block_pair.push_back(pairs[static_cast<std::size_t>(i)]);
   return sheet;
 }
 
@@ -383,10 +364,24 @@ void scale_links(Sheet& sheet, double factor) {
 SheetEnergy energy(const Sheet& sheet, const Points3& x, const Points3& link_offset) {
   SheetEnergy result;
   const auto add = [](double a, double b) { return a + b; };
-  result.membrane = parallel_reduce(sheet.corners.size(), grain, 0.0, [&](std::size_t begin, std::size_t end) {
+  result.membrane = parallel_reduce(sheet.units.size(), grain, 0.0, [&](std::size_t begin, std::size_t end) {
     double sum = 0;
-    for (std::size_t f = begin; f < end; ++f) {
-      sum += sheet.shapes[f].area * membrane_energy(sheet.fabrics[static_cast<std::size_t>(sheet.fabric_of_face[f])], yarn_gradient(sheet, x, f));
+    for (std::size_t u = begin; u < end; ++u) {
+      const MembraneUnit& unit = sheet.units[u];
+      const auto f = static_cast<std::size_t>(unit.first);
+      const fabric::Constitutive& fabric = sheet.fabrics[static_cast<std::size_t>(sheet.fabric_of_face[f])];
+      if (unit.second < 0) {
+        sum += sheet.shapes[f].area * membrane_energy(fabric, yarn_gradient(sheet, x, f));
+        continue;
+      }
+      const auto g = static_cast<std::size_t>(unit.second);
+      const std::array<YarnState, 2> state{yarn_state(yarn_gradient(sheet, x, f)), yarn_state(yarn_gradient(sheet, x, g))};
+      const YarnState mean = mean_state(sheet, unit, state[0], state[1]);
+      for (std::size_t k = 0; k < 2; ++k) {
+        sum += sheet.shapes[k == 0 ? f : g].area *
+               (own_part * (fabric.weft.at(state[k].weft - 1).energy + fabric.warp.at(state[k].warp - 1).energy) + fabric.shear.at(state[k].sine).energy +
+                (1 - own_part) * (fabric.weft.at(mean.weft - 1).energy + fabric.warp.at(mean.warp - 1).energy));
+      }
     }
     return sum;
   }, add);
@@ -403,6 +398,7 @@ SheetEnergy energy(const Sheet& sheet, const Points3& x, const Points3& link_off
     }
     return sum;
   }, add);
+  for (const HingeElement& hinge : sheet.hinges) result.bending += hinge_state(hinge, x, nullptr).energy;
   for (std::size_t i = 0; i < sheet.links.size(); ++i) {
     const Link& link = sheet.links[i];
     result.links += 0.5 * link.stiffness * (x.row(link.a) - x.row(link.b) - link_offset.row(static_cast<Eigen::Index>(i))).squaredNorm();
@@ -421,24 +417,77 @@ void evaluate(const Sheet& sheet, const Points3& x, const Points3& link_offset, 
   response.gradient.resize(sheet.node_count, 3);
   const auto add = [](double a, double b) { return a + b; };
   response.energy = {};
-  response.energy.membrane = parallel_reduce(nf, grain, 0.0, [&](std::size_t begin, std::size_t end) {
-    double sum = 0;
-    for (std::size_t f = begin; f < end; ++f) {
-      const TriangleShape& shape = sheet.shapes[f];
-      const MembraneResponse r = membrane_response(sheet.fabrics[static_cast<std::size_t>(sheet.fabric_of_face[f])], yarn_gradient(sheet, x, f),
-                                                   curvature.value_or(Curvature::exact));
-      sum += shape.area * r.energy;
-      for (std::size_t k = 0; k < 3; ++k) {
-        response.corner_force[f].col(static_cast<Eigen::Index>(k)) = shape.area * (shape.slope_u[k] * r.stress.weft + shape.slope_v[k] * r.stress.warp);
+  const std::size_t elements = sheet.element_start.size() - 1;
+  response.entry_gradient.resize(sheet.element_node.size());
+  response.element_force.resize(elements);
+  response.element_slope.resize(elements);
+  const auto face_response = [&](std::size_t f, const MembraneResponse& r) {
+    const TriangleShape& shape = sheet.shapes[f];
+    for (std::size_t k = 0; k < 3; ++k) {
+      response.corner_force[f].col(static_cast<Eigen::Index>(k)) = shape.area * (shape.slope_u[k] * r.stress.weft + shape.slope_v[k] * r.stress.warp);
+    }
+    if (!curvature) return;
+    for (std::size_t a = 0; a < 3; ++a) {
+      for (std::size_t b = a; b < 3; ++b) {
+        const double au = shape.slope_u[a], av = shape.slope_v[a], bu = shape.slope_u[b], bv = shape.slope_v[b];
+        response.face_blocks[f][static_cast<std::size_t>(block_slot[a][b])] =
+            shape.area * (au * bu * r.weft_weft + au * bv * r.weft_warp + av * bu * r.weft_warp.transpose() + av * bv * r.warp_warp);
       }
-      if (!curvature) continue;
-      for (std::size_t a = 0; a < 3; ++a) {
-        for (std::size_t b = a; b < 3; ++b) {
-          const double au = shape.slope_u[a], av = shape.slope_v[a], bu = shape.slope_u[b], bv = shape.slope_v[b];
-          response.face_blocks[f][static_cast<std::size_t>(block_slot[a][b])] =
-              shape.area * (au * bu * r.weft_weft + au * bv * r.weft_warp + av * bu * r.weft_warp.transpose() + av * bv * r.warp_warp);
+    }
+  };
+  const Curvature kind = curvature.value_or(Curvature::exact);
+  response.energy.membrane = parallel_reduce(sheet.units.size(), grain, 0.0, [&](std::size_t begin, std::size_t end) {
+    double sum = 0;
+    for (std::size_t u = begin; u < end; ++u) {
+      const MembraneUnit& unit = sheet.units[u];
+      const auto f = static_cast<std::size_t>(unit.first);
+      const fabric::Constitutive& fabric = sheet.fabrics[static_cast<std::size_t>(sheet.fabric_of_face[f])];
+      if (unit.second < 0) {
+        const MembraneResponse r = membrane_response(fabric, yarn_gradient(sheet, x, f), kind);
+        sum += sheet.shapes[f].area * r.energy;
+        face_response(f, r);
+        continue;
+      }
+      const std::array<std::size_t, 2> faces{f, static_cast<std::size_t>(unit.second)};
+      const std::array<YarnGradient, 2> gradient{yarn_gradient(sheet, x, faces[0]), yarn_gradient(sheet, x, faces[1])};
+      const std::array<YarnState, 2> state{yarn_state(gradient[0]), yarn_state(gradient[1])};
+      const YarnState mean = mean_state(sheet, unit, state[0], state[1]);
+      const double area = sheet.shapes[faces[0]].area + sheet.shapes[faces[1]].area;
+      const fabric::CurvePoint weft = scaled(fabric.weft.at(mean.weft - 1), 1 - own_part), warp = scaled(fabric.warp.at(mean.warp - 1), 1 - own_part);
+      for (std::size_t k = 0; k < 2; ++k) {
+        // The pair's force pulls on either face; its slope couples the two and goes into the elements.
+        fabric::CurvePoint own_weft = scaled(fabric.weft.at(state[k].weft - 1), own_part), own_warp = scaled(fabric.warp.at(state[k].warp - 1), own_part);
+        own_weft.force += weft.force;
+        own_warp.force += warp.force;
+        own_weft.energy += weft.energy;
+        own_warp.energy += warp.energy;
+        const MembraneResponse r = membrane_response(own_weft, own_warp, fabric.shear.at(state[k].sine), gradient[k], kind);
+        sum += sheet.shapes[faces[k]].area * r.energy;
+        face_response(faces[k], r);
+        const TriangleShape& shape = sheet.shapes[faces[k]];
+        const double part = shape.area / area;
+        const Eigen::Vector3d along_weft = part / state[k].weft * gradient[k].weft, along_warp = part / state[k].warp * gradient[k].warp;
+        const auto entry = static_cast<std::size_t>(sheet.element_start[static_cast<std::size_t>(unit.element)]) + 3 * k;
+        for (std::size_t c = 0; c < 3; ++c) {
+          response.entry_gradient[entry + c] = shape.slope_u[c] * along_weft;
+          response.entry_gradient[entry + 6 + c] = shape.slope_v[c] * along_warp;
         }
       }
+      const auto e = static_cast<std::size_t>(unit.element);
+      response.element_force[e] = response.element_force[e + 1] = 0;
+      response.element_slope[e] = area * weft.slope;
+      response.element_slope[e + 1] = area * warp.slope;
+    }
+    return sum;
+  }, add);
+
+  const double element_energy = parallel_reduce(sheet.hinges.size(), grain, 0.0, [&](std::size_t begin, std::size_t end) {
+    double sum = 0;
+    for (std::size_t e = begin; e < end; ++e) {
+      const fabric::CurvePoint state = hinge_state(sheet.hinges[e], x, response.entry_gradient.data() + sheet.element_start[e]);
+      sum += state.energy;
+      response.element_force[e] = state.force;
+      response.element_slope[e] = state.slope;
     }
     return sum;
   }, add);
@@ -470,10 +519,15 @@ void evaluate(const Sheet& sheet, const Points3& x, const Points3& link_offset, 
         force += response.corner_force[static_cast<std::size_t>(item / 3)].col(item % 3).transpose();
       }
       for (int k = sheet.node_link_start[i]; k < sheet.node_link_start[i + 1]; ++k) force += end_force(sheet.node_link[static_cast<std::size_t>(k)]);
+      for (int k = sheet.node_entry_start[i]; k < sheet.node_entry_start[i + 1]; ++k) {
+        const auto entry = static_cast<std::size_t>(sheet.node_entry[static_cast<std::size_t>(k)]);
+        force += response.element_force[static_cast<std::size_t>(sheet.entry_element[entry])] * response.entry_gradient[entry].transpose();
+      }
       response.gradient.row(row) = force;
     }
     return sum;
   }, add);
+  response.energy.bending += element_energy;
   for (std::size_t i = 0; i < links; ++i) {
     const Link& link = sheet.links[i];
     response.energy.links += 0.5 * link.stiffness * (x.row(link.a) - x.row(link.b) - link_offset.row(static_cast<Eigen::Index>(i))).squaredNorm();
@@ -503,6 +557,11 @@ void evaluate(const Sheet& sheet, const Points3& x, const Points3& link_offset, 
         } else {
           sum += block.transpose();
         }
+      }
+      for (int p = sheet.block_pair_start[slot]; p < sheet.block_pair_start[slot + 1]; ++p) {
+        const auto [first, second] = sheet.block_pair[static_cast<std::size_t>(p)];
+        const double slope = response.element_slope[static_cast<std::size_t>(sheet.entry_element[static_cast<std::size_t>(first)])];
+        sum += slope * response.entry_gradient[static_cast<std::size_t>(first)] * response.entry_gradient[static_cast<std::size_t>(second)].transpose();
       }
       matrix.value[slot] = Block::from(sum);
     }

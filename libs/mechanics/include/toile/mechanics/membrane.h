@@ -31,6 +31,16 @@ enum class Curvature {
 
 MembraneResponse membrane_response(const fabric::Constitutive& fabric, const YarnGradient& gradient, Curvature curvature);
 
+/// What the energy depends on: length of both yarns over their rest length, sine of the shear angle.
+struct YarnState {
+  double weft = 1, warp = 1, sine = 0;
+};
+YarnState yarn_state(const YarnGradient& gradient);
+
+/// Response with energies of its own choice: their derivatives by the lengths and the sine. The energy is the sum of the three.
+MembraneResponse membrane_response(const fabric::CurvePoint& weft, const fabric::CurvePoint& warp, const fabric::CurvePoint& shear, const YarnGradient& gradient,
+                                   Curvature curvature);
+
 /// A triangle's shape functions: weft = sum_k slope_u[k] x_k, warp = sum_k slope_v[k] x_k.
 struct TriangleShape {
   std::array<double, 3> slope_u{}, slope_v{};  ///< [1/m]

@@ -35,23 +35,49 @@ struct Spring {
   double length = 0;     ///< [m]
 };
 
+/// Energy stiffness/2 (angle - rest)^2 of two triangles on an edge.
+struct HingeElement {
+  std::array<int, 4> node{};  ///< the edge as the first triangle runs along it, then the corner of either triangle opposite to it
+  double rest = 0;            ///< positive: the face sides turn towards each other [rad]
+  double stiffness = 0;       ///< [N m]
+};
+
+/// Tangent plane of the cloth at a vertex, held by two further nodes at x + length * dx/du and x + length * dx/dv.
+struct Director {
+  int vertex = 0, node = 0;
+  int ghost_u = 0, ghost_v = 0;  ///< node ids
+  double length = 0;             ///< [m]
+};
+
 struct SheetOptions {
+  std::vector<int> directed_vertices;  ///< whose tangent plane gets nodes of its own (clamps)
   double link_stiffness = 500;   ///< of open seams, per node pair [N/m]
   double fastener_stiffness = 500;  ///< [N/m]
 };
 
+/// A face by itself, or two that share an edge off the grid and stretch as one: the energy of a yarn direction is that of their
+/// mean stretch (by area). docs/mechanics.md#membrane
+struct MembraneUnit {
+  int first = 0, second = -1;
+  int element = -1;  ///< of a pair: the element of its mean weft stretch; that of the warp follows
+};
+
 struct Sheet {
-  int node_count = 0;
+  int node_count = 0;                      ///< points of the cloth, then the directors' nodes
+  int cloth_nodes = 0;                     ///< points of the cloth
   Ids node_of_vertex;                      ///< |garment vertices|
   std::vector<std::array<int, 3>> corners; ///< node ids, |F|
   std::vector<TriangleShape> shapes;       ///< |F|
   std::vector<int> fabric_of_face;         ///< index into fabrics, |F|
+  std::vector<MembraneUnit> units;         ///< every face in one of them
   std::vector<fabric::Constitutive> fabrics;
   Eigen::VectorXd mass;                    ///< [kg], |nodes|
   Eigen::VectorXd area;                    ///< rest area that belongs to each node [m2]
   ScalarMatrix bending;                    ///< constant: gradient = bending * x [N/m]
   std::vector<Link> links;
   std::vector<Spring> springs;
+  std::vector<Director> directors;
+  std::vector<HingeElement> hinges;
 
   // where things go (fixed gather order, so that sums do not depend on threads)
   std::vector<int> node_corner_start, node_corner;     ///< 3 * face + corner around each node
@@ -59,6 +85,13 @@ struct Sheet {
   std::vector<int> row_start, column, diagonal;        ///< block pattern of the second derivative
   std::vector<int> block_part_start, block_part;       ///< 9 * face + 3 * a + b per block
   std::vector<double> constant_part;                   ///< bending and links of each block, times identity [N/m]
+
+  // Elements whose energy is a function of one number: their second derivative is taken as slope * gradient gradient^T.
+  std::vector<int> element_start, element_node;             ///< nodes of each element; |elements| + 1, |entries|
+  std::vector<int> node_entry_start, node_entry;            ///< entries of each node
+  std::vector<int> block_pair_start;                        ///< per block
+  std::vector<std::pair<int, int>> block_pair;              ///< entries of one element that meet in the block
+  std::vector<int> entry_element;
 };
 
 /// node_of_vertex  vertices with the same id are one point; ids dense from 0
@@ -82,6 +115,8 @@ struct SheetResponse {
   BlockMatrix matrix;
   std::vector<Eigen::Matrix<double, 3, 3>> corner_force;  ///< columns: gradient at the corners of each face
   std::vector<std::array<Eigen::Matrix3d, 6>> face_blocks;
+  std::vector<Eigen::Vector3d> entry_gradient;            ///< of each element's number
+  std::vector<double> element_force, element_slope;
 };
 
 /// x             [m], |nodes| x 3
