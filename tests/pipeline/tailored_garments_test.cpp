@@ -9,13 +9,17 @@
 #include <string>
 
 #include "toile/base/rng.h"
+#include "toile/io/fabric_yaml.h"
 #include "toile/io/file.h"
 #include "toile/io/pattern_yaml.h"
 #include "toile/io/ply.h"
 #include "toile/io/record_yaml.h"
+#include "toile/tailor/fold.h"
+#include "toile/tailor/layer.h"
 #include "toile/tailor/mesh_panels.h"
 #include "toile/tailor/quality.h"
 #include "toile/tailor/sew.h"
+#include "toile/tailor/trim.h"
 
 using namespace toile;
 
@@ -29,16 +33,58 @@ T checked(Result<T> result) {
 
 std::string source(const std::string& name) { return checked(io::read_file(std::string(TOILE_SOURCE_DIR) + "/" + name)); }
 
-mesh::GarmentMesh panels_of(const std::string& garment, double cell) {
+mesh::GarmentMesh cut(const std::string& garment, tailor::MeshParams params, double cell) {
   const auto pattern = checked(io::parse_pattern(source("samples/patterns/" + garment + ".yaml"), garment));
-  auto params = checked(io::read_record<tailor::MeshParams>(source("pipelines/" + garment + "/mesh.yaml"), "mesh.yaml"));
   params.cell = cell;
   return checked(tailor::mesh_panels(checked(pattern::cut_panels(pattern)), params));
 }
 
-tailor::SewParams seams_of(const std::string& garment) {
-  return checked(io::read_record<tailor::SewParams>(source("pipelines/" + garment + "/seams.yaml"), "seams.yaml"));
+template <class Params>
+Params spec(const std::string& garment, const std::string& name) {
+  return checked(io::read_record<Params>(source("pipelines/" + garment + "/" + name + ".yaml"), name + ".yaml"));
 }
+
+/// The panels of the shell: the chest piece, which is laid on, left out.
+mesh::GarmentMesh panels_of(const std::string& garment, double cell) {
+  auto params = spec<tailor::MeshParams>(garment, "mesh");
+  if (garment == "jacket") params.leave_out.push_back("chest_canvas");
+  return cut(garment, params, cell);
+}
+
+tailor::SewParams seams_of(const std::string& garment) { return spec<tailor::SewParams>(garment, "seams"); }
+
+/// All that the lined garment is until it is placed.
+struct Lined {
+  mesh::GarmentMesh sewn;
+  tailor::Layered layered;
+};
+
+Lined lined(const std::string& garment, const std::vector<std::string>& fabrics, double cell) {
+  Lined result;
+  const auto params = spec<tailor::SewParams>(garment, "lined_seams");
+  const auto sewn = checked(tailor::sew(cut(garment, spec<tailor::MeshParams>(garment, "lined_mesh"), cell), params));
+  result.sewn = checked(tailor::add_folds(checked(tailor::finish_seams(sewn.garment, params.seams)).garment, params.folds)).garment;
+  std::vector<fabric::Card> cards;
+  for (const std::string& name : fabrics) cards.push_back(checked(io::read_fabric(source("samples/fabrics/" + name + ".yaml"), name)));
+  result.layered = checked(tailor::layer(result.sewn, cards, spec<tailor::LayerParams>(garment, "lined_layers")));
+  EXPECT_TRUE(mesh::validate(result.layered.garment).empty());
+  return result;
+}
+
+/// The lined garment has the shell's seams, as long as those of the shell alone.
+void expect_seams_of_the_shell(const mesh::GarmentMesh& sewn, const std::string& garment, double cell) {
+  for (const mesh::Seam& seam : checked(tailor::sew(panels_of(garment, cell), seams_of(garment))).garment.seams) {
+    const auto same = std::find_if(sewn.seams.begin(), sewn.seams.end(), [&](const mesh::Seam& other) { return other.name == seam.name; });
+    ASSERT_NE(same, sewn.seams.end()) << seam.name;
+    EXPECT_NEAR(same->length_a, seam.length_a, 1e-9) << seam.name;
+    EXPECT_NEAR(same->length_b, seam.length_b, 1e-9) << seam.name;
+  }
+}
+
+const mesh::Panel& panel(const mesh::GarmentMesh& garment, const std::string& name) { return garment.panels[static_cast<std::size_t>(checked(mesh::find_panel(garment, name)))]; }
+
+/// [kg]
+double mass(const mesh::GarmentMesh& garment) { return mesh::vertex_masses(garment).sum(); }
 
 /// Lengths of the two sides [mm].
 using Lengths = std::map<std::string, std::pair<double, double>>;
@@ -165,4 +211,67 @@ TEST(waistcoat, shell_is_one_piece_with_three_openings_and_the_drafted_lengths) 
 
 TEST(waistcoat, seams_in_any_order_give_the_same_bytes) {
   expect_same_bytes_in_any_order(panels_of("waistcoat", 0.02), seams_of("waistcoat"));
+}
+
+TEST(jacket, lined_has_its_facings_collar_lining_and_pockets_as_layers_of_their_own) {
+  const auto [sewn, layered] = lined("jacket", {"suiting", "lining", "hair_canvas", "collar_canvas"}, 0.01);
+  expect_seams_of_the_shell(sewn, "jacket", 0.01);
+  const mesh::GarmentMesh& g = layered.garment;
+  // The two chest pieces are used up; pockets hang by their tacks on the one garment.
+  EXPECT_EQ(sewn.panels.size(), 29u);
+  EXPECT_EQ(g.panels.size(), 27u);
+  EXPECT_EQ(tailor::surface_report(g).components, 1);
+  ASSERT_EQ(g.free_layers.size(), 4u);
+  for (const mesh::Panel& p : g.panels) {
+    const bool shell = p.name.find("lining") == std::string::npos && p.name.rfind("facing", 0) != 0 && p.name.rfind("pocket", 0) != 0 && p.name.rfind("collar", 0) != 0;
+    EXPECT_EQ(p.order, shell ? 0 : p.name.rfind("pocket", 0) == 0 ? 1 : -1) << p.name;
+  }
+  // The facing is turned in along the whole edge from the notch to the hem.
+  for (const mesh::Seam& seam : g.seams) {
+    if (seam.name == "facing_left" || seam.name == "facing_right") {
+      EXPECT_NEAR(seam.length_a, 0.73169, 1e-5);
+    }
+  }
+  // Lapels and collar turn towards the shell's face, facings and upper collar, which lie on its back, the other way.
+  ASSERT_EQ(g.folds.size(), 6u);
+  for (const mesh::Fold& fold : g.folds) {
+    const bool inner = fold.name.rfind("facing", 0) == 0 || fold.name == "upper_collar";
+    EXPECT_GT(inner ? -fold.angle : fold.angle, 2.5) << fold.name;
+  }
+  // The canvas is cut to the chest piece, less the dart; the hems to the line that they are turned up to.
+  std::map<std::string, tailor::LayerReport> layers;
+  for (const auto& row : layered.layers) layers[row.name] = row;
+  const auto& canvas = layers.at("chest_canvas");
+  ASSERT_TRUE(canvas.piece_area);
+  EXPECT_NEAR(canvas.area, *canvas.piece_area, 0.03 * *canvas.piece_area);
+  EXPECT_NEAR(layers.at("hem_back").area, 2 * 0.206268 * 0.04, 1e-6);
+  EXPECT_NEAR(layers.at("hem_side").area, 2 * 0.087976 * 0.04, 1e-6);
+  double cut_area = 0;
+  for (const mesh::Panel& p : g.panels) cut_area += p.cut_area;
+  EXPECT_NEAR(mesh::rest_areas(g).sum(), cut_area, 1e-4 * cut_area);
+  EXPECT_NEAR(mesh::rest_areas(g).sum(), mesh::rest_areas(cut("jacket", spec<tailor::MeshParams>("jacket", "lined_mesh"), 0.01)).sum() - *canvas.piece_area, 2e-4 * cut_area);
+  // All that weighs: faces by their sheets, allowances, buttons.
+  double sheets = 0;
+  const Eigen::VectorXd areas = mesh::rest_areas(g);
+  for (Eigen::Index f = 0; f < g.face_count(); ++f) {
+    for (const auto& ply : g.laminates[static_cast<std::size_t>(g.face_laminate[f])].plies) sheets += ply.areal_density * areas[f];
+  }
+  EXPECT_NEAR(mass(g), sheets + mesh::trimmings_mass(g), 1e-9);
+  EXPECT_EQ(g.fasteners.size(), 2u);
+  EXPECT_EQ(panel(g, "facing_m").material, "fabric");
+}
+
+TEST(waistcoat, lined_is_a_closed_bag_with_six_buttons) {
+  const auto [sewn, layered] = lined("waistcoat", {"suiting", "lining", "fusible_canvas"}, 0.01);
+  expect_seams_of_the_shell(sewn, "waistcoat", 0.01);
+  // Two sheets with three openings each, sewn to each other all round: no border is left.
+  const tailor::SurfaceReport surface = tailor::surface_report(layered.garment);
+  EXPECT_EQ(surface.components, 1);
+  EXPECT_EQ(surface.openings, 0);
+  EXPECT_EQ(surface.euler, 2 * (2 - 3));
+  EXPECT_EQ(surface.branching_edges, 0);
+  EXPECT_EQ(layered.garment.free_layers.size(), 2u);
+  EXPECT_EQ(layered.garment.fasteners.size(), 6u);
+  EXPECT_EQ(panel(layered.garment, "front_lining").order, -1);
+  EXPECT_EQ(panel(layered.garment, "front").order, 0);
 }
