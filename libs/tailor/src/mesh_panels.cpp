@@ -81,6 +81,8 @@ Result<mesh::GarmentMesh> mesh_panels(const std::vector<pattern::CutPanel>& all_
       grid.mesher = own.mesher.value_or(grid.mesher);
       grid.turn = own.turn.value_or(grid.turn);
     }
+    grid.cell_warp *= params.scale;
+    grid.cell_weft *= params.scale;
     settings.push_back(grid);
   }
   std::vector<std::set<std::string>> lines(panels.size()), named(panels.size());

@@ -47,6 +47,7 @@ struct MeshParams {
   Diagonal diagonal = Diagonal::alternating;
   Mesher mesher = Mesher::grid;
   double turn = 0.6;
+  double scale = 1;
   std::map<std::string, PanelGrid> panels;
   std::vector<std::string> lines;
   std::vector<std::string> cut;
@@ -59,6 +60,7 @@ struct MeshParams {
     f(&MeshParams::diagonal, {.key = "diagonal", .doc = "how a cell is cut into triangles: alternating, single, or the shorter one where corners were moved"});
     f(&MeshParams::mesher, {.key = "mesher", .doc = "grid: particles on warp and weft lines; delaunay: as many without lines, for comparison"});
     f(&MeshParams::turn, {.key = "turn", .doc = "largest turn of border and lines from particle to particle; up to four a cell are set for it", .unit = "rad", .min = 0.05, .max = 3.2});
+    f(&MeshParams::scale, {.key = "scale", .doc = "all grid sizes, those of single panels too, times this: one spec for several resolutions", .min = 0.01, .max = 100});
     f(&MeshParams::panels, {.key = "panels", .doc = "settings of single panels, by the name of panel or piece"});
     f(&MeshParams::lines, {.key = "lines", .doc = "internal lines (panel.line) that become edges of the mesh; * stands for any letters"});
     f(&MeshParams::cut, {.key = "cut", .doc = "internal lines that are cut: closed ones out, open ones open (edges line and line_r); * takes those of kind cut and dart"});
