@@ -1,54 +1,20 @@
 // Times the programs of a pipeline as whole processes, and reading and writing of a large garment.
 // usage: pipeline_bench BIN_DIR PIPELINE.yaml BUILD_DIR REPORT.json
 // Rows: case, seconds (wall), cpu_s, peak_mb; the sum over the pipeline's stages last.
-#include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
-#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "garments.h"
+#include "process.h"
 #include "toile/base/text.h"
 #include "toile/io/file.h"
 #include "toile/io/ply.h"
 
 using namespace toile;
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
-
-namespace {
-
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
-
-struct Usage {
-  int code = 1;
-  double wall = 0, cpu = 0, peak_mb = 0;
-};
-
-Usage timed(const std::vector<std::string>& words) {
-  std::vector<char*> argv;
-  for (const std::string& word : words) argv.push_back(const_cast<char*>(word.c_str()));
-  argv.push_back(nullptr);
-  const auto start = Clock::now();
-  std::fflush(stdout);  // or the child writes the pending rows again
-  const pid_t child = ::fork();
-  if (child == 0) {
-    if (!std::freopen("/dev/null", "w", stdout)) ::_exit(127);
-    ::execv(argv[0], argv.data());
-    ::_exit(127);
-  }
-  int status = 0;
-  struct rusage usage {};
-  ::wait4(child, &status, 0, &usage);
-  const auto seconds = [](const timeval& t) { return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec); };
-  return {WIFEXITED(status) ? WEXITSTATUS(status) : 1, seconds_since(start), seconds(usage.ru_utime) + seconds(usage.ru_stime), static_cast<double>(usage.ru_maxrss) / 1024};
-}
-
-}  // namespace
+using namespace toile::bench;
 
 int main(int argc, char** argv) {
   if (argc != 5) {
