@@ -32,7 +32,7 @@ struct InfoStage {
 
   static stage::Description description() {
     return {.name = "toile-info",
-            .version = 2,
+            .version = 3,
             .summary = "Tells what is in a garment or a support file.",
             .example = "toile-info draped.ply --support form.ply",
             .details = "Text for people, or JSON with --json, which holds the bill of materials too. docs/measures.md defines the figures, "

@@ -43,6 +43,7 @@ struct SewStage {
     TOILE_TRY(tailor::Trimmed trimmed, tailor::add_trims(finished.garment, params.trims));
     trimmed.trims.insert(trimmed.trims.begin(), finished.trims.begin(), finished.trims.end());
     sewn.garment = std::move(trimmed.garment);
+    for (const Issue& note : sewn.notes) run.warn(note);
     const tailor::SurfaceReport surface = tailor::surface_report(sewn.garment);
     run.report("seams", sewn.seams.size());
     run.report("welds", sewn.garment.welds.size());

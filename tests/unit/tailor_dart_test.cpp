@@ -8,6 +8,7 @@
 #include <set>
 #include <sstream>
 
+#include "toile/inspect/measures.h"
 #include "toile/io/pattern_yaml.h"
 #include "toile/mesh/topology.h"
 #include "toile/tailor/mesh_panels.h"
@@ -108,6 +109,47 @@ TEST(dart, tips_are_smooth_cones_on_grids_of_any_size) {
     }
     EXPECT_NEAR(mesh::rest_areas(s).sum() / cut[0].area, 1, 0.5 * cell);
   }
+}
+
+TEST(dart, legs_are_measured_to_their_tips_and_chains_past_their_mouths) {
+  tailor::SewParams params;
+  params.seams = seams();
+  // The waist is sewn to a band of its own, over the dart: what lies between its legs is no part of the seam.
+  const auto band = io::parse_pattern(R"(units: mm
+y: up
+pieces:
+  band:
+    cut: 1
+    grain: [[0, 0], [0, 10]]
+    points: {a: [0, 0], b: [276, 0], c: [276, 40], d: [0, 40]}
+    outline:
+      - {name: low, path: [a, b]}
+      - {name: right, path: [b, c]}
+      - {name: top, path: [c, d]}
+      - {name: left, path: [d, a]}
+)", "band.yaml");
+  ASSERT_TRUE(band);
+  auto cut = panels();
+  const auto more = pattern::cut_panels(*band);
+  ASSERT_TRUE(more);
+  cut.insert(cut.end(), more->begin(), more->end());
+  const auto both = tailor::mesh_panels(cut, {});
+  ASSERT_TRUE(both) << to_string(both.issues().front());
+  tailor::SeamSpec waist;
+  waist.name = "waistband";
+  waist.a = {"front.waist_side", "front.waist"};
+  waist.b = {"-band.low"};
+  params.seams.push_back(waist);
+  const auto sewn = tailor::sew(*both, params);
+  ASSERT_TRUE(sewn) << to_string(sewn.issues().front());
+  const auto table = inspect::seam_table(sewn->garment);
+  ASSERT_EQ(table.size(), 4u);
+  for (const auto& row : table) {
+    // Chords of the curved legs are shorter by a hair.
+    EXPECT_NEAR(row.now_a, row.cut_a, 2e-4 * row.cut_a) << row.name;
+    EXPECT_NEAR(row.now_b, row.cut_b, 2e-4 * row.cut_b) << row.name;
+  }
+  EXPECT_NEAR(table[3].now_a, 0.276, 1e-12);
 }
 
 TEST(dart, the_cloth_of_darts_is_kept_where_it_is_asked_for) {

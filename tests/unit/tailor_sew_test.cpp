@@ -169,6 +169,85 @@ TEST(sew, ring_on_ring) {
   EXPECT_EQ(surface.branching_edges, 0);
 }
 
+TEST(sew, a_ring_that_is_set_in_turned_is_noted) {
+  // Two tubes of two panels each, 40 and 60 mm wide.
+  const auto g = rectangles({{4, 4, 0.01}, {6, 4, 0.01}, {4, 4, 0.01}, {6, 4, 0.01}});
+  const std::vector<tailor::SeamSpec> tubes{seam("lower_1", {"p0.right"}, {"-p1.left"}), seam("lower_2", {"p1.right"}, {"-p0.left"}), seam("upper_1", {"p2.right"}, {"-p3.left"}), seam("upper_2", {"p3.right"}, {"-p2.left"})};
+  const auto joined = [&](const tailor::SeamSpec& ring) {
+    auto seams = tubes;
+    seams.push_back(ring);
+    return sewn(g, params_of(seams));
+  };
+  EXPECT_TRUE(joined(seam("ring", {"p1.top", "p0.top"}, {"-p3.bottom", "-p2.bottom"})).notes.empty());
+  auto turned = seam("ring", {"p1.top", "p0.top"}, {"-p2.bottom", "-p3.bottom"});
+  const auto result = joined(turned);
+  ASSERT_EQ(result.notes.size(), 1u);
+  EXPECT_EQ(result.notes[0].code, "turned_ring");
+  EXPECT_TRUE(has(result.notes[0].what, "1 of the seams")) << result.notes[0].what;
+  EXPECT_TRUE(has(result.notes[0].what, "2 would if side b (-p2.bottom -p3.bottom) were begun 40.0 mm later")) << result.notes[0].what;
+  turned.match = {{"p1.top_right", "p2.bottom_right"}};
+  EXPECT_TRUE(joined(turned).notes.empty()) << "a match point says that it is meant";
+}
+
+TEST(sew, ease_at_the_start_of_a_ring_lies_before_it) {
+  const auto pattern = io::parse_pattern(R"(units: mm
+y: up
+pieces:
+  plate:
+    cut: 1
+    grain: [[0, 0], [0, 10]]
+    points: {a: [0, 0], b: [200, 0], c: [200, 200], d: [0, 200], q0: [70, 70], q1: [70, 130], q2: [130, 130], q3: [130, 70]}
+    outline:
+      - {name: border, path: [a, b, c, d, a]}
+    holes:
+      window:
+        - {name: h0, path: [q0, q1]}
+        - {name: h1, path: [q1, q2]}
+        - {name: h2, path: [q2, q3]}
+        - {name: h3, path: [q3, q0]}
+  band:
+    cut: 1
+    grain: [[0, 0], [0, 10]]
+    points: {a: [0, 0], b: [246, 0], c: [246, 40], d: [0, 40]}
+    outline:
+      - {name: low, path: [a, b]}
+      - {name: right, path: [b, c]}
+      - {name: top, path: [c, d]}
+      - {name: left, path: [d, a]}
+)", "window.yaml");
+  ASSERT_TRUE(pattern) << to_string(pattern.issues().front());
+  const auto cut = pattern::cut_panels(*pattern);
+  ASSERT_TRUE(cut) << to_string(cut.issues().front());
+  const auto g = tailor::mesh_panels(*cut, {});
+  ASSERT_TRUE(g) << to_string(g.issues().front());
+  auto ring = seam("ring", {"plate.h0", "plate.h1", "plate.h2", "plate.h3"}, {"-band.top"});
+  ring.ease = 0.006;
+  const auto partner_of_corner = [&](const char* name, const tailor::SeamSpec& spec) {
+    const auto result = sewn(*g, params_of({seam("close", {"band.right"}, {"-band.left"}), spec}));
+    for (const auto& point : result.garment.points) {
+      if (point.name != name) continue;
+      for (const auto& weld : result.garment.welds) {
+        if (weld.a == point.vertex) return result.garment.uv(weld.b, 0);
+      }
+    }
+    return -1.0;
+  };
+  // The last side of the window takes all of it, whether it is named by its corners or by its edge.
+  for (const auto& zone : {tailor::EaseZone{"plate.q3", "plate.q0", 1}, tailor::EaseZone{"plate.h3(0 %)", "plate.h3(100 %)", 1}}) {
+    ring.ease_at = {zone};
+    EXPECT_NEAR(partner_of_corner("q1", ring), 0.06, 1e-6) << zone.to;
+    EXPECT_NEAR(partner_of_corner("q3", ring), 0.18, 1e-6) << zone.to;
+  }
+  ring.ease_at = {{"plate.q0", "plate.q1", 1}};
+  EXPECT_NEAR(partner_of_corner("q1", ring), 0.066, 1e-6);
+  // A match point turns the ring: its start lies inside the zone, which is in two parts then.
+  ring.match = {{"plate.q2", "band.d"}};
+  ring.ease_at = {{"plate.h1(50 %)", "plate.h2(50 %)", 1}};
+  EXPECT_NEAR(partner_of_corner("q3", ring), 0.063, 1e-6);
+  EXPECT_NEAR(partner_of_corner("q0", ring), 0.123, 1e-6);
+  EXPECT_NEAR(partner_of_corner("q1", ring), 0.183, 1e-6);
+}
+
 TEST(sew, four_corners_become_one_particle) {
   // Four quarters of a square; seams chain across the middle.
   const auto g = rectangles({{3, 3, 0.01}, {3, 3, 0.01}, {3, 3, 0.01}, {3, 3, 0.01}});

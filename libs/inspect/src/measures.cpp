@@ -227,23 +227,46 @@ Spread spread(std::vector<double> values) {
 std::vector<SeamFigures> seam_table(const mesh::GarmentMesh& g) {
   std::vector<SeamFigures> result;
   for (const mesh::Seam& seam : g.seams) result.push_back({seam.name, seam.kind, 0, seam.length_a, seam.length_b});
-  std::vector<const mesh::Weld*> last(g.seams.size(), nullptr);
+  // What each vertex is sewn to, by seam and side.
+  struct Stitch {
+    int seam, side, partner;
+  };
+  std::vector<std::vector<Stitch>> stitches(static_cast<std::size_t>(g.vertex_count()));
   for (const mesh::Weld& w : g.welds) {
     SeamFigures& s = result[static_cast<std::size_t>(w.seam)];
-    const mesh::Weld*& previous = last[static_cast<std::size_t>(w.seam)];
-    // Where a side passes from one panel to the next the two vertices are one point: no length of cloth lies between.
-    if (previous != nullptr) {
-      if (g.vertex_panel[w.a] == g.vertex_panel[previous->a]) s.now_a += (g.x.row(w.a) - g.x.row(previous->a)).norm();
-      if (g.vertex_panel[w.b] == g.vertex_panel[previous->b]) s.now_b += (g.x.row(w.b) - g.x.row(previous->b)).norm();
-    }
-    previous = &w;
     const double gap = (g.x.row(w.a) - g.x.row(w.b)).norm();
     s.max_gap = std::max(s.max_gap, gap);
     s.mean_gap += gap;
     ++s.welds;
+    stitches[static_cast<std::size_t>(w.a)].push_back({w.seam, 0, w.b});
+    stitches[static_cast<std::size_t>(w.b)].push_back({w.seam, 1, w.a});
   }
   for (SeamFigures& s : result) {
     if (s.welds > 0) s.mean_gap /= static_cast<double>(s.welds);
+  }
+
+  // The pieces of runs whose two ends a seam holds on one side. The tip of a dart is one vertex and in no weld: it ends both legs.
+  std::set<std::array<int, 2>> pieces;
+  for (std::size_t k = 1; k < g.run_vertices.size(); ++k) {
+    const auto &from = g.run_vertices[k - 1], &to = g.run_vertices[k];
+    if (from.run == to.run) pieces.insert({std::min(from.vertex, to.vertex), std::max(from.vertex, to.vertex)});
+  }
+  const auto is_piece = [&](int u, int v) { return pieces.count({std::min(u, v), std::max(u, v)}) != 0; };
+  for (const auto& piece : pieces) {
+    std::set<std::pair<int, int>> held;  // seam and side
+    for (const auto& [u, v] : {std::pair{piece[0], piece[1]}, std::pair{piece[1], piece[0]}}) {
+      const auto& beyond = stitches[static_cast<std::size_t>(v)];
+      for (const Stitch& s : stitches[static_cast<std::size_t>(u)]) {
+        const bool sewn = std::any_of(beyond.begin(), beyond.end(), [&](const Stitch& t) { return t.seam == s.seam && t.side == s.side; });
+        const bool tip = !sewn && std::none_of(beyond.begin(), beyond.end(), [&](const Stitch& t) { return t.seam == s.seam; }) && is_piece(s.partner, v);
+        if (sewn || tip) held.emplace(s.seam, s.side);
+      }
+    }
+    const double length = (g.x.row(piece[0]) - g.x.row(piece[1])).norm();
+    for (const auto& [seam, side] : held) {
+      SeamFigures& s = result[static_cast<std::size_t>(seam)];
+      if (s.cut_a > 0 || s.cut_b > 0) (side == 0 ? s.now_a : s.now_b) += length;  // tacks have no length
+    }
   }
   return result;
 }

@@ -103,6 +103,7 @@ class Planner {
     result.rows = rows();
     if (!issues_.empty()) return issues_;
     result.bonds = planned_bonds(result.rows);
+    result.notes = notes_;
     return result;
   }
 
@@ -336,7 +337,59 @@ class Planner {
         break;
       }
     }
+    for (const Bond& bond : bonds_) {
+      if (bond.matches.empty() && closed(bond)) look_for_turn(bond);
+    }
     for (std::size_t b = 0; b < bonds_.size(); ++b) tie(bonds_[b], std::count(doubtful.begin(), doubtful.end(), b) > 0);
+  }
+
+  /// Where a ring passes from one panel to another, and its start where its ends are two vertices: seams that end there [m]. None
+  /// if the ring begins inside an edge: somebody chose the place.
+  std::vector<double> joints(const Path& path) const {
+    std::vector<double> result;
+    for (const auto& [m, run] : {std::pair{path.front().m0, path.front().run}, std::pair{path.back().m1, path.back().run}}) {
+      const double c = marks_[static_cast<std::size_t>(m)].c;
+      if (c > same_place && c < run_length(run) - same_place) return {};
+    }
+    if (marks_[static_cast<std::size_t>(path.front().m0)].vertex != marks_[static_cast<std::size_t>(path.back().m1)].vertex) result.push_back(0);
+    for (std::size_t k = 1; k < path.size(); ++k) {
+      if (marks_[static_cast<std::size_t>(path[k - 1].m1)].vertex != marks_[static_cast<std::size_t>(path[k].m0)].vertex) result.push_back(path[k].start);
+    }
+    return result;
+  }
+
+  /// Notes a ring without match points in which more seams would meet if one of its chains were turned.
+  void look_for_turn(const Bond& bond) {
+    const std::array<std::vector<double>, 2> own{joints(bond.paths[0]), joints(bond.paths[1])};
+    const std::array<double, 2> length{path_length(bond.paths[0]), path_length(bond.paths[1])};
+    const double near = std::max({bond.allowed, 0.01 * length[0], always_allowed}) / length[0];
+    const auto meeting = [&](double turn) {
+      int count = 0;
+      for (double a : own[0]) {
+        for (double b : own[1]) {
+          const double off = a / length[0] + turn - b / length[1];
+          if (std::abs(off - std::round(off)) <= near) {
+            ++count;
+            break;
+          }
+        }
+      }
+      return count;
+    };
+    const int now = meeting(0);
+    int best = now;
+    double turn = 0;
+    for (double a : own[0]) {
+      for (double b : own[1]) {
+        double other = b / length[1] - a / length[0];
+        other -= std::floor(other);
+        if (const int count = meeting(other); count > best) best = count, turn = other;
+      }
+    }
+    if (best == now) return;
+    notes_.push_back(seam_issue(spec(bond.seam), "turned_ring",
+                                fmt::format("{} of the seams that end at this ring meet one of its other side; {} would if {} were begun {:.1f} mm later", now, best, side_text(spec(bond.seam), bond.side), turn * length[1] * 1e3),
+                                "begin both chains at the same seam, or confirm the way they lie by a match point"));
   }
 
   void find_matches(Bond& bond) {
@@ -393,6 +446,10 @@ class Planner {
   void tie(Bond& bond, bool ring) {
     if (ring) {
       const Knot start = located(bond).front();
+      // The ring begins there from now on. (The mark of a joint may be the one at its end.)
+      std::erase_if(bond.matches, [&](const std::array<int, 2>& match) {
+        return point_of(bond.paths[0], match[0])->along == start[0].along && point_of(bond.paths[1], match[1])->along == start[1].along;
+      });
       for (std::size_t side = 0; side < 2; ++side) bond.paths[side] = rotated(bond.paths[side], start[side]);
     }
     bond.knots = given_knots(bond);
@@ -430,10 +487,16 @@ class Planner {
         const double own_start = start[static_cast<std::size_t>(side)], own_length = length[static_cast<std::size_t>(side)];
         std::vector<std::array<double, 2>> stretches{{from->along, to->along}};
         if (from->along > to->along) stretches = {{0, to->along}, {from->along, path_length(bond.paths[static_cast<std::size_t>(side)])}};
+        // The start of a ring may lie inside a zone; where both parts lie between the same match points they divide its share.
+        const std::size_t before = parts.size();
+        double width = 0;
         for (const auto& [a, b] : stretches) {
           const double low = std::max(a - own_start, 0.0), high = std::min(b - own_start, own_length);
-          if (high - low > same_place) parts.push_back({side, low, high, zone.share, a - own_start >= 0 ? m_from : -1, b - own_start <= own_length ? m_to : -1});
+          if (high - low <= same_place) continue;
+          parts.push_back({side, low, high, zone.share, a == from->along && a - own_start >= 0 ? m_from : -1, b == to->along && b - own_start <= own_length ? m_to : -1});
+          width += high - low;
         }
+        for (std::size_t i = before; i < parts.size(); ++i) parts[i].share *= (parts[i].to - parts[i].from) / width;
       }
       if (parts.empty()) continue;
       std::sort(parts.begin(), parts.end(), [](const Part& p, const Part& q) { return p.from < q.from; });
@@ -1004,6 +1067,7 @@ class Planner {
   std::vector<std::vector<Member>> groups_;
   std::vector<int> mark_slot_;
   Issues issues_;
+  Issues notes_;
 };
 
 }  // namespace

@@ -48,6 +48,7 @@ struct PlanBond {
 struct SeamPlan {
   std::vector<std::vector<PlanSlot>> rows;  ///< by run; empty where the run stays as it is
   std::vector<PlanBond> bonds;              ///< by seam and side
+  Issues notes;                             ///< what deserves a look
 };
 
 /// Precondition: specs are ordered by name.

@@ -20,16 +20,18 @@ const std::vector<std::string>& side_list(const SeamSpec& spec, int side) {
   return side == 0 ? spec.a : side == 1 ? spec.b : spec.more[static_cast<std::size_t>(side - 2)];
 }
 
-/// First place along a side that is meant.
-std::optional<SidePlace> place_on_side(const std::vector<PlanRun>& runs, const SeamSides& seam, int side, const PanelPlace& place) {
+/// The places along a side that are meant, in order: where a closed chain begins it ends, too.
+std::vector<SidePlace> places_on_side(const std::vector<PlanRun>& runs, const SeamSides& seam, int side, const PanelPlace& place) {
+  std::vector<SidePlace> found;
   double start = 0;
   const auto& parts = seam.sides[static_cast<std::size_t>(side)];
   for (std::size_t k = 0; k < parts.size(); ++k) {
     const RunPart& part = parts[k];
-    std::optional<double> best;
+    const std::size_t before = found.size();
     const auto consider = [&](double s) {
       if (s < part.from.s - rounding || s > part.to.s + rounding) return;
-      if (!best || (part.reversed ? s > *best : s < *best)) best = std::clamp(s, part.from.s, part.to.s);
+      const double at = std::clamp(s, part.from.s, part.to.s);
+      found.push_back({side, static_cast<int>(k), at, place.vertex, start + (part.reversed ? part.to.s - at : at - part.from.s)});
     };
     if (place.run < 0) {
       for (const auto& vertex : runs[static_cast<std::size_t>(part.run)].row) {
@@ -38,10 +40,27 @@ std::optional<SidePlace> place_on_side(const std::vector<PlanRun>& runs, const S
     } else if (place.run == part.run) {
       consider(place.s);
     }
-    if (best) return SidePlace{side, static_cast<int>(k), *best, place.vertex, start + (part.reversed ? part.to.s - *best : *best - part.from.s)};
+    std::sort(found.begin() + static_cast<std::ptrdiff_t>(before), found.end(), [](const SidePlace& p, const SidePlace& q) { return p.along < q.along; });
     start += part.length();
   }
-  return std::nullopt;
+  return found;
+}
+
+std::optional<SidePlace> place_on_side(const std::vector<PlanRun>& runs, const SeamSides& seam, int side, const PanelPlace& place) {
+  const auto found = places_on_side(runs, seam, side, place);
+  return found.empty() ? std::nullopt : std::optional(found.front());
+}
+
+/// The two ends of a zone in sewing order. Of a place that is passed twice the passage counts that lets `from` come before `to`.
+std::optional<std::pair<SidePlace, SidePlace>> zone_on_side(const std::vector<PlanRun>& runs, const SeamSides& seam, int side, const PanelPlace& from, const PanelPlace& to) {
+  const auto begins = places_on_side(runs, seam, side, from), ends = places_on_side(runs, seam, side, to);
+  for (const SidePlace& p : begins) {
+    for (const SidePlace& q : ends) {
+      if (p.along < q.along) return std::pair(p, q);
+    }
+  }
+  if (begins.empty() || ends.empty()) return std::nullopt;
+  return std::pair(ends.front(), begins.front());
 }
 
 }  // namespace
@@ -113,12 +132,11 @@ ResolvedSides resolve_sides(const GarmentMesh& garment, const std::vector<PlanRu
       if (!from || !to || !complete) continue;
       bool found = false;
       for (int side = 0; side < sides && !found; ++side) {
-        auto p = place_on_side(runs, seam, side, *from), q = place_on_side(runs, seam, side, *to);
-        if (!p || !q) continue;
-        if (p->along > q->along) std::swap(p, q);
+        const auto ends = zone_on_side(runs, seam, side, *from, *to);
+        if (!ends) continue;
         found = true;
-        if (q->along - p->along < always_allowed) issues.push_back(seam_issue(*spec, "bad_ease", fmt::format("from '{}' to '{}' is no stretch of its side", zone.from, zone.to), "name two different places"));
-        else seam.zones.push_back({*p, *q, zone.share});
+        if (ends->second.along - ends->first.along < always_allowed) issues.push_back(seam_issue(*spec, "bad_ease", fmt::format("from '{}' to '{}' is no stretch of its side", zone.from, zone.to), "name two different places"));
+        else seam.zones.push_back({ends->first, ends->second, zone.share});
       }
       if (!found) issues.push_back(seam_issue(*spec, "bad_ease", fmt::format("'{}' and '{}' are not on one side of the seam", zone.from, zone.to), "name two places on the edges of one side"));
     }

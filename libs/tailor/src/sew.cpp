@@ -86,6 +86,7 @@ Result<Sewn> sew(const GarmentMesh& garment, const SewParams& params) {
 
   // Places along the seams, by vertices of the table.
   Sewn result;
+  result.notes = plan.notes;
   std::vector<std::vector<std::array<int, 2>>> welds(plan.bonds.size());
   std::vector<std::array<int, 2>> all;
   std::vector<int> tips;

@@ -119,6 +119,7 @@ struct Sewn {
   mesh::GarmentMesh garment;
   std::vector<SeamReport> seams;              ///< one for each row of garment.seams
   std::vector<std::vector<SeamPlace>> lines;  ///< by seam, all places in order, also those that need no weld (the tip of a dart)
+  Issues notes;                               ///< what deserves a look: "turned_ring"
 };
 
 /// The seams alone; folds and trims come after, by add_folds() and add_trims().
