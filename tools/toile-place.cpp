@@ -2,24 +2,27 @@
 #include "toile/placement/place.h"
 #include "toile/stage/stage.h"
 
-#include <algorithm>
+#include <numbers>
 
 namespace {
 
 using namespace toile;
+
+double degrees(double angle) { return angle * 180 / std::numbers::pi; }
 
 struct PlaceStage {
   using Params = placement::PlaceParams;
 
   static stage::Description description() {
     return {.name = "toile-place",
-            .version = 3,
+            .version = 4,
             .summary = "Bends sewn flat panels around a body without stretching them and draws their seams together.",
             .example = "toile-place layered.ply form.ply -o placed.ply",
             .details = "Each panel goes on the trunk or on an arm, as its name and its seams say (front, back, waistband, sleeve), or as `panels` "
                        "in the spec says. Panels are rolled round that part with every length kept, then drawn together by their seams while "
                        "the body, flattened at first, swells between them. The seams that stay open close in the simulation; the summary lists "
-                       "them, with the largest edge strain, the smallest gap to the body and any intersections. The body needs no landmarks: "
+                       "them, with the largest edge strain, the angle of the warp from its wanted direction, the smallest gap to the body and any intersections; "
+                       "the file has them as columns (edge_strain, ease, seam_gap of vertices; warp_angle, cuts of faces). The body needs no landmarks: "
                        "waist, hips, armpits, shoulders and arms are found from its sections. docs/placement.md says how.",
             .inputs = {{.name = "garment", .doc = "sewn garment (flat panels)", .kind = stage::FileKind::garment},
                        {.name = "support", .doc = "body or dress form: closed, upright, facing +z, arms held away", .kind = stage::FileKind::support}},
@@ -37,10 +40,17 @@ struct PlaceStage {
     run.report("area_change", report.area_change);
     run.report("min_gap", report.smallest_gap, "m");
     run.report("vertices_inside", report.vertices_inside);
-    run.report("support_intersections", report.support_intersections);
-    run.report("self_intersections", report.self_intersections);
+    run.report("support_intersections", report.support_intersections.size());
+    run.report("self_intersections", report.self_intersections.size());
     run.report("mean_seam_gap", report.mean_seam_gap, "m");
     run.report("max_seam_gap", report.largest_seam_gap, "m");
+    run.report("mean_warp_angle", degrees(report.mean_warp_angle), "deg");
+    run.report("max_warp_angle", degrees(report.largest_warp_angle), "deg");
+    for (const placement::WarpAngle& angle : report.warp_angles) {
+      const std::string& name = garment.panels[static_cast<std::size_t>(angle.panel)].name;
+      run.report("mean_warp_angle_" + name, degrees(angle.mean), "deg");
+      run.report("max_warp_angle_" + name, degrees(angle.largest), "deg");
+    }
     for (const placement::SeamGap& seam : report.seams) {
       const std::string& name = garment.seams[static_cast<std::size_t>(seam.seam)].name;
       run.report("mean_gap_" + name, seam.mean, "m");

@@ -69,8 +69,8 @@ void expect_placed(const placement::Placed& placed, const placement::PlaceParams
   EXPECT_LE(std::abs(report.area_change), 0.001);
   EXPECT_GE(report.smallest_gap, params.clearance);
   EXPECT_EQ(report.vertices_inside, 0);
-  EXPECT_EQ(report.support_intersections, 0);
-  EXPECT_EQ(report.self_intersections, 0);
+  EXPECT_TRUE(report.support_intersections.empty());
+  EXPECT_TRUE(report.self_intersections.empty());
   EXPECT_LE(report.mean_seam_gap, mean_gap);
   EXPECT_LE(report.largest_seam_gap, largest_gap);
 }

@@ -532,7 +532,9 @@ void Run::check_end() {
 GarmentMesh Run::output() const {
   GarmentMesh result = garment_;
   result.x = scatter(x_, sheet_.node_of_vertex);
-  for (const char* name : {"vx", "vy", "vz"}) result.vertex_columns.erase(name);
+  // What was measured on the start no longer holds.
+  for (const char* name : {"vx", "vy", "vz", "edge_strain", "ease", "seam_gap"}) result.vertex_columns.erase(name);
+  for (const char* name : {"warp_angle", "cuts"}) result.face_columns.erase(name);
   if (params_.mode == Mode::motion) {
     const Points3 v = scatter(velocity_, sheet_.node_of_vertex);
     int c = 0;

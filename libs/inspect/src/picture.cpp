@@ -458,9 +458,14 @@ Result<ColorField> color_field(const std::string& name, const mesh::GarmentMesh&
     field.diverging = std::any_of(field.values.begin(), field.values.end(), [](double e) { return e < 0; });
     return field;
   }
+  // Columns of known meaning in units that people read.
+  static const std::map<std::string, std::pair<std::string, double>> titles{
+      {"edge_strain", {"largest edge strain [%]", 100}}, {"seam_gap", {"seam gap [mm]", 1e3}}, {"warp_angle", {"warp off its direction [\xC2\xB0]", 1 / degree}}, {"ease", {"ease [mm]", 1e3}}};
   const auto column = [&](const mesh::Column& c, ColorField::Place place) {
-    ColorField field{name, place, {}, false};
-    for (std::size_t i = 0; i < c.size(); ++i) field.values.push_back(c.integer ? c.integers[i] : c.reals[i]);
+    const auto known = titles.find(name);
+    ColorField field{known != titles.end() ? known->second.first : name, place, {}, false};
+    const double factor = known != titles.end() ? known->second.second : 1;
+    for (std::size_t i = 0; i < c.size(); ++i) field.values.push_back(factor * (c.integer ? c.integers[i] : c.reals[i]));
     field.diverging = std::any_of(field.values.begin(), field.values.end(), [](double v) { return v < 0; });
     return field;
   };

@@ -317,14 +317,23 @@ CoarseGarment coarsen(const mesh::GarmentMesh& garment, double wanted) {
       faces.push_back({number(t[0]), number(t[1]), number(t[2])});
       face_panel.push_back(panel);
     }
-    // Where fine vertices are in it.
+    // Where fine vertices are in it: first among the triangles whose box reaches into the vertex's cell of a grid.
+    std::map<std::pair<long, long>, std::vector<std::size_t>> boxes;
+    const auto cell_of = [&](const Vector2d& q) { return std::pair(static_cast<long>(std::floor(q.x() / size)), static_cast<long>(std::floor(q.y() / size))); };
+    for (std::size_t k = 0; k < own.size(); ++k) {
+      const Vector2d a = uv(own[k][0]), b = uv(own[k][1]), c = uv(own[k][2]);
+      const auto low = cell_of(a.cwiseMin(b).cwiseMin(c) - Vector2d::Constant(1e-9)), high = cell_of(a.cwiseMax(b).cwiseMax(c) + Vector2d::Constant(1e-9));
+      for (long i = low.first; i <= high.first; ++i) {
+        for (long j = low.second; j <= high.second; ++j) boxes[{i, j}].push_back(k);
+      }
+    }
     parallel_for(members.size(), 64, [&](std::size_t i) {
       const int v = members[i];
       double best = -1e18;
-      for (const auto& t : own) {
+      const auto consider = [&](const std::array<int, 3>& t) {
         if (at(side, v) >= 0) {
           const bool other = std::any_of(t.begin(), t.end(), [&](int w) { return at(side, w) >= 0 && at(side, w) != at(side, v); });
-          if (other) continue;
+          if (other) return;
         }
         const Vector2d a = uv(t[0]), b = uv(t[1]), c = uv(t[2]), q = uv(v);
         const double area = cross(b - a, c - a);
@@ -336,7 +345,14 @@ CoarseGarment coarsen(const mesh::GarmentMesh& garment, double wanted) {
           best = score;
           coarse.of_fine[static_cast<std::size_t>(v)] = {t, w};
         }
+      };
+      const auto it = boxes.find(cell_of(uv(v)));
+      if (it != boxes.end()) {
+        for (const std::size_t k : it->second) consider(own[k]);
       }
+      if (best >= 0) return;
+      best = -1e18;
+      for (const auto& t : own) consider(t);
     });
   }
   for (const FoldLine& fold : folds) {  // on the line: between the kept vertices before and after

@@ -30,6 +30,7 @@ constexpr double kPolish = 0.8;           // polishing goes on until strains are
 constexpr double kArmTransition = 0.08;   // from the trunk's side to where arms keep their true shape [m]
 constexpr double kNarrow = 0.01;          // cloth may lack this part of a girth before it is refused: it can slide to where it fits
 constexpr double kSleeveGap = 0.004;       // between a sleeve and the trunk's panels at the start [m]
+constexpr double kLevel = 3;              // of edge lengths from one mesh to the next
 constexpr double kSheet = 0.004;           // between sheets that lie on one another at the start [m]
 
 double polygon_perimeter(const Points2& p) {
@@ -158,6 +159,13 @@ std::vector<double> sheets(const mesh::GarmentMesh& garment, const FoldedFlat& f
   }
   return result;
 }
+
+// One of the meshes of a garment, from fine to coarse.
+struct Level {
+  const mesh::GarmentMesh* mesh;
+  FoldedFlat flat;
+  Points3 bent;
+};
 
 }  // namespace
 
@@ -368,53 +376,6 @@ Result<Start> bend(const mesh::GarmentMesh& garment, const FoldedFlat& folded, c
   return start;
 }
 
-Report measure(const mesh::GarmentMesh& garment, const mesh::SupportMesh& support) {
-  Report report;
-  const StrainSummary strain = edge_strain(garment, garment.x);
-  report.max_strain = strain.largest;
-  report.rms_strain = strain.rms;
-  double area = 0, flat_area = 0;
-  const Eigen::VectorXd rest = mesh::rest_areas(garment);
-  for (Eigen::Index f = 0; f < garment.face_count(); ++f) {
-    const Vector3d a = garment.x.row(garment.faces(f, 0)), b = garment.x.row(garment.faces(f, 1)), c = garment.x.row(garment.faces(f, 2));
-    area += 0.5 * (b - a).cross(c - a).norm();
-    flat_area += rest[f];
-  }
-  report.area_change = flat_area > 0 ? area / flat_area - 1 : 0;
-  std::vector<SeamGap> gaps(garment.seams.size());
-  std::vector<int> counts(garment.seams.size(), 0);
-  double total = 0;
-  for (std::size_t i = 0; i < gaps.size(); ++i) gaps[i].seam = static_cast<int>(i);
-  for (const mesh::Weld& weld : garment.welds) {
-    const double gap = (garment.x.row(weld.a) - garment.x.row(weld.b)).norm();
-    SeamGap& seam = gaps[static_cast<std::size_t>(weld.seam)];
-    seam.mean += gap;
-    seam.largest = std::max(seam.largest, gap);
-    ++counts[static_cast<std::size_t>(weld.seam)];
-    total += gap;
-    report.largest_seam_gap = std::max(report.largest_seam_gap, gap);
-  }
-  for (std::size_t i = 0; i < gaps.size(); ++i) {
-    if (counts[i] > 0) gaps[i].mean /= counts[i];
-  }
-  report.seams = std::move(gaps);
-  report.mean_seam_gap = garment.welds.empty() ? 0 : total / static_cast<double>(garment.welds.size());
-  const contact::Surface body = contact::make_surface(static_cast<int>(support.x.rows()), support.faces);
-  const contact::SupportField field(body, support.x);
-  std::vector<contact::SurfacePoint> near;
-  std::vector<int> warm;
-  field.nearest(garment.x, 10, near, warm);
-  report.smallest_gap = 1e9;
-  for (const auto& p : near) {
-    report.smallest_gap = std::min(report.smallest_gap, p.distance);
-    if (p.distance < 0) ++report.vertices_inside;
-  }
-  const contact::Surface cloth = contact::make_surface(static_cast<int>(garment.x.rows()), garment.faces, mesh::particles(garment));
-  report.self_intersections = static_cast<int>(contact::self_intersections(cloth, garment.x).size());
-  report.support_intersections = static_cast<int>(contact::support_intersections(cloth, garment.x, body, support.x).size());
-  return report;
-}
-
 Result<Placed> place(const mesh::GarmentMesh& sewn, const mesh::SupportMesh& support, const PlaceParams& params, const std::function<void(double)>& progress) {
   const std::vector<int> stuck = stuck_folds(sewn);
   const mesh::GarmentMesh garment = without_folds(sewn, stuck);
@@ -435,9 +396,6 @@ Result<Placed> place(const mesh::GarmentMesh& sewn, const mesh::SupportMesh& sup
   options.rms_strain = kPolish * params.rms_strain;
   options.seam = params.seam;
   options.bending = params.bending;
-  options.progress = [&](double f) {
-    if (progress) progress(0.5 * f);
-  };
   Placed placed;
   placed.garment = sewn;
   for (int fold : stuck) {
@@ -445,7 +403,7 @@ Result<Placed> place(const mesh::GarmentMesh& sewn, const mesh::SupportMesh& sup
                                .what = "its line curves round the part that turns: without stretching the cloth it cannot be folded back; it is placed flat",
                                .remedy = "the simulation turns it, or straighten the line"});
   }
-  // Large folds on a coarse mesh, where they are cheap; then the fine one needs to lose the creases between coarse
+  // Large folds on a coarse mesh, where they are cheap; then finer ones need to lose the creases between coarse
   // triangles only.
   // A mesh of about the coarse size is its own coarse mesh: thinning it a little only spoils its triangles.
   double cell = 0;
@@ -472,32 +430,51 @@ Result<Placed> place(const mesh::GarmentMesh& sewn, const mesh::SupportMesh& sup
     stage.swelling_steps = 0;
     return relax(mesh, x, support, stage);
   };
-  Points3 folded;
-  if (params.coarse > 1.25 * cell) {
-    const CoarseGarment coarse = coarsen(garment, params.coarse);
-    FoldedFlat flat;
-    flat.uv.resize(static_cast<Eigen::Index>(coarse.fine_of.size()), 2);
-    for (std::size_t i = 0; i < coarse.fine_of.size(); ++i) {
-      flat.uv.row(static_cast<Eigen::Index>(i)) = folded_flat.uv.row(coarse.fine_of[i]);
-      flat.layer.push_back(folded_flat.layer[static_cast<std::size_t>(coarse.fine_of[i])]);
+  // From the coarsest mesh to the given one, each about a third as fine as the next.
+  std::vector<double> sizes;
+  for (double size = kLevel * cell; size < params.coarse / kLevel; size *= kLevel) sizes.push_back(size);
+  if (params.coarse > 1.25 * cell) sizes.push_back(params.coarse);
+  const double levels = static_cast<double>(sizes.size()) + 1;
+  std::vector<CoarseGarment> coarse;
+  std::vector<Level> meshes{{&garment, folded_flat, start.x}};
+  coarse.reserve(sizes.size());
+  for (const double size : sizes) {
+    const Level& finer = meshes.back();
+    coarse.push_back(coarsen(*finer.mesh, size));
+    const CoarseGarment& made = coarse.back();
+    Level level{&made.mesh, {}, made.restricted(finer.bent)};
+    level.flat.uv.resize(static_cast<Eigen::Index>(made.fine_of.size()), 2);
+    for (std::size_t i = 0; i < made.fine_of.size(); ++i) {
+      level.flat.uv.row(static_cast<Eigen::Index>(i)) = finer.flat.uv.row(made.fine_of[i]);
+      level.flat.layer.push_back(finer.flat.layer[static_cast<std::size_t>(made.fine_of[i])]);
     }
-    folded = coarse.prolonged(assemble(coarse.mesh, flat, coarse.restricted(start.x)));
-  } else {
-    folded = assemble(garment, folded_flat, start.x);
+    meshes.push_back(std::move(level));
   }
-  // A fine triangle that lies across an edge of the coarse mesh cuts its corner: sheets near one another may come through.
-  const contact::Surface cloth = contact::make_surface(static_cast<int>(folded.rows()), garment.faces, mesh::particles(garment));
-  if (!contact::self_intersections(cloth, folded).empty()) folded = contact::untangle(cloth, folded).x;
-  if (shaped) options.rolled = start.x;
+  double done = 0;
+  options.progress = [&](double f) {
+    if (progress) progress((done + f) / (levels + 1));
+  };
+  Points3 x = assemble(*meshes.back().mesh, meshes.back().flat, meshes.back().bent);
   options.flattening.depth = 1;
   options.closing_steps = 0;
   options.swelling_steps = 0;
   options.settling_steps = params.fine_steps;
-  options.progress = [&](double f) {
-    if (progress) progress(0.5 + 0.5 * f);
-  };
-  placed.garment.x = relax(garment, folded, support, options);
-  placed.report = measure(placed.garment, support);
+  for (std::size_t i = meshes.size(); i-- > 0;) {
+    done += 1;
+    if (i + 1 < meshes.size() || meshes.size() == 1) {
+      if (shaped) options.rolled = meshes[i].bent;
+      x = relax(*meshes[i].mesh, x, support, options);
+    }
+    if (i == 0) break;
+    x = coarse[i - 1].prolonged(x);
+    // A fine triangle that lies across an edge of the coarse mesh cuts its corner: sheets near one another may come through.
+    const mesh::GarmentMesh& finer = *meshes[i - 1].mesh;
+    const contact::Surface cloth = contact::make_surface(static_cast<int>(x.rows()), finer.faces, mesh::particles(finer));
+    if (!contact::self_intersections(cloth, x).empty()) x = contact::untangle(cloth, x).x;
+  }
+  placed.garment.x = x;
+  placed.report = measure(placed.garment, support, wanted_directions(garment, folded_flat, layout, frame, start.x));
+  add_columns(placed.garment, placed.report);
   const Report& report = placed.report;
   const auto finding = [&](const char* code, const std::string& what, const std::string& remedy) {
     placed.findings.push_back({.code = code, .place = {.item = "garment"}, .what = what, .remedy = remedy, .category = Category::check});
@@ -508,11 +485,25 @@ Result<Placed> place(const mesh::GarmentMesh& sewn, const mesh::SupportMesh& sup
   if (report.rms_strain > params.rms_strain) {
     finding("strain", fmt::format("root mean square edge strain {:.5f} is over {:.5f}", report.rms_strain, params.rms_strain), "give more settling_steps, a smaller offset, or a larger size");
   }
-  if (report.vertices_inside > 0 || report.support_intersections > 0) {
-    finding("inside_support", fmt::format("{} vertices are inside the support, {} pairs of triangles cut", report.vertices_inside, report.support_intersections), "give a larger offset or a finer mesh");
+  const auto between = [&](const std::vector<contact::FacePair>& pairs, bool with_support) {
+    std::map<std::pair<std::string, std::string>, int> count;
+    const auto name = [&](int face) { return sewn.panels[static_cast<std::size_t>(sewn.face_panel[face])].name; };
+    for (const auto& pair : pairs) {
+      const std::string a = name(pair.a), b = with_support ? std::string() : name(pair.b);
+      ++count[with_support || a < b ? std::pair(a, b) : std::pair(b, a)];
+    }
+    std::string text;
+    for (const auto& [names, n] : count) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", names.second.empty() || names.first == names.second ? names.first : names.first + "/" + names.second, n);
+    return text;
+  };
+  if (report.vertices_inside > 0 || !report.support_intersections.empty()) {
+    finding("inside_support", fmt::format("{} vertices are inside the support, {} pairs of triangles cut{}", report.vertices_inside, report.support_intersections.size(),
+                                          report.support_intersections.empty() ? "" : " (" + between(report.support_intersections, true) + ")"),
+            "give a larger offset or a finer mesh; the simulation pushes the cloth out first");
   }
-  if (report.self_intersections > 0) {
-    finding("self_intersection", fmt::format("{} pairs of cloth triangles cut one another", report.self_intersections), "give more steps, or move panels apart (shift)");
+  if (!report.self_intersections.empty()) {
+    finding("self_intersection", fmt::format("{} pairs of cloth triangles cut one another ({})", report.self_intersections.size(), between(report.self_intersections, false)),
+            "give more steps, or move panels apart (shift); the simulation takes crossings of a few triangles apart");
   }
   return placed;
 }

@@ -147,6 +147,12 @@ class Relaxation {
       count += list.size();
     }
     bridges_.resize(count);
+    double sum = 0;
+    for (const auto& list : stretches_) {
+      for (const Stretch& c : list) sum += c.rest;
+    }
+    // Neighbours along the cloth are no contacts.
+    reach_ = std::clamp(0.4 * sum / static_cast<double>(std::max<std::size_t>(count, 1)), 1.2 * options.thickness, 3 * options.thickness);
     warm_.assign(walls_.size(), -1);
     warm_middles_.assign(count, -1);
   }
@@ -548,7 +554,7 @@ class Relaxation {
     contacts_.clear();
     normals_.clear();
     wanted_.clear();
-    for (const contact::Contact& c : search_.proximity(x_, x_, {.self = 3 * options_.thickness}).self) {
+    for (const contact::Contact& c : search_.proximity(x_, x_, {.self = reach_}).self) {
       if (c.distance < 1e-7) continue;
       Eigen::RowVector3d gap = Eigen::RowVector3d::Zero();
       for (std::size_t k = 0; k < 4; ++k) gap += c.weight[k] * x_.row(c.node[k]);
@@ -611,6 +617,7 @@ class Relaxation {
   std::vector<int> warm_, warm_middles_;
   std::vector<Wall> bridges_;  // of the middles of all edges, panel by panel
   double walls_depth_ = -1;
+  double reach_ = 0;  // within which contacts are looked for [m]
 };
 
 }  // namespace

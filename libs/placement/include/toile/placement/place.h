@@ -8,28 +8,13 @@
 #include "toile/placement/flatten.h"
 #include "toile/placement/layout.h"
 #include "toile/placement/params.h"
+#include "toile/placement/report.h"
 
 #include <functional>
 #include <string>
 #include <vector>
 
 namespace toile::placement {
-
-struct SeamGap {
-  int seam = 0;
-  double mean = 0, largest = 0;  ///< distance of welded pairs [m]
-};
-
-struct Report {
-  double max_strain = 0, rms_strain = 0;  ///< of all edges [1]
-  double area_change = 0;                 ///< placed over flat area, minus 1
-  double smallest_gap = 0;                ///< of a vertex from the support [m], negative inside
-  int vertices_inside = 0;
-  int support_intersections = 0;          ///< pairs of cloth and support triangles
-  int self_intersections = 0;
-  double mean_seam_gap = 0, largest_seam_gap = 0;  ///< of all welded pairs [m]
-  std::vector<SeamGap> seams;
-};
 
 struct Placed {
   mesh::GarmentMesh garment;
@@ -48,7 +33,5 @@ struct Start {
   Flattening flattening;  ///< of the support that the panels were bent around
 };
 Result<Start> bend(const mesh::GarmentMesh& garment, const FoldedFlat& folded, const BodyFrame& frame, const Layout& layout, const PlaceParams& params);
-
-Report measure(const mesh::GarmentMesh& garment, const mesh::SupportMesh& support);
 
 }  // namespace toile::placement
