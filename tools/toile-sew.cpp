@@ -17,7 +17,7 @@ struct SewStage {
 
   static stage::Description description() {
     return {.name = "toile-sew",
-            .version = 4,
+            .version = 5,
             .summary = "Sews panels along named edges: border particles of the two sides become the same particle.",
             .example = "toile-sew panels.ply -o sewn.ply --spec pipelines/tee/seams.yaml",
             .details = "A side of a seam is a chain of edges in sewing order: panel.edge, or a part of it, panel.edge(from..to), between named "

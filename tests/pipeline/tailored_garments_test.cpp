@@ -83,6 +83,31 @@ void expect_seams_of_the_shell(const mesh::GarmentMesh& sewn, const std::string&
 
 const mesh::Panel& panel(const mesh::GarmentMesh& garment, const std::string& name) { return garment.panels[static_cast<std::size_t>(checked(mesh::find_panel(garment, name)))]; }
 
+/// Panels that are mirror images have the same particles there, and faces, to the last bit or nearly.
+void expect_symmetric(const mesh::GarmentMesh& g) {
+  int pairs = 0;
+  for (const mesh::Panel& plain : g.panels) {
+    const auto twin = std::find_if(g.panels.begin(), g.panels.end(), [&](const mesh::Panel& p) { return p.name == plain.name + "_m"; });
+    if (twin == g.panels.end()) continue;
+    ++pairs;
+    const auto places = [&](int panel, double sign) {
+      std::vector<std::pair<double, double>> list;
+      for (Eigen::Index v = 0; v < g.vertex_count(); ++v) {
+        if (g.vertex_panel[v] == panel) list.emplace_back(std::round(g.uv(v, 1) * 1e7), std::round(sign * g.uv(v, 0) * 1e7));
+      }
+      std::sort(list.begin(), list.end());
+      return list;
+    };
+    const auto own = places(plain.id, 1), other = places(twin->id, -1);
+    EXPECT_EQ(own.size(), other.size()) << plain.name;
+    EXPECT_EQ((g.face_panel.array() == plain.id).count(), (g.face_panel.array() == twin->id).count()) << plain.name;
+    std::size_t apart = 0;
+    for (std::size_t k = 0; k < std::min(own.size(), other.size()); ++k) apart += std::abs(own[k].first - other[k].first) > 1 || std::abs(own[k].second - other[k].second) > 1;
+    EXPECT_EQ(apart, 0u) << plain.name;
+  }
+  EXPECT_GT(pairs, 0);
+}
+
 /// [kg]
 double mass(const mesh::GarmentMesh& garment) { return mesh::vertex_masses(garment).sum(); }
 
@@ -213,6 +238,15 @@ TEST(waistcoat, seams_in_any_order_give_the_same_bytes) {
   expect_same_bytes_in_any_order(panels_of("waistcoat", 0.02), seams_of("waistcoat"));
 }
 
+TEST(jacket, both_halves_are_mirror_images) {
+  expect_symmetric(checked(tailor::sew(panels_of("jacket", 0.01), seams_of("jacket"))).garment);
+  expect_symmetric(checked(tailor::sew(cut("jacket", spec<tailor::MeshParams>("jacket", "lined_mesh"), 0.01), spec<tailor::SewParams>("jacket", "lined_seams"))).garment);
+}
+
+TEST(jacket, seams_of_the_lined_one_in_any_order_give_the_same_bytes) {
+  expect_same_bytes_in_any_order(cut("jacket", spec<tailor::MeshParams>("jacket", "lined_mesh"), 0.02), spec<tailor::SewParams>("jacket", "lined_seams"));
+}
+
 TEST(jacket, lined_has_its_facings_collar_lining_and_pockets_as_layers_of_their_own) {
   const auto [sewn, layered] = lined("jacket", {"suiting", "lining", "hair_canvas", "collar_canvas"}, 0.01);
   expect_seams_of_the_shell(sewn, "jacket", 0.01);
@@ -259,6 +293,11 @@ TEST(jacket, lined_has_its_facings_collar_lining_and_pockets_as_layers_of_their_
   EXPECT_NEAR(mass(g), sheets + mesh::trimmings_mass(g), 1e-9);
   EXPECT_EQ(g.fasteners.size(), 2u);
   EXPECT_EQ(panel(g, "facing_m").material, "fabric");
+}
+
+TEST(waistcoat, both_halves_are_mirror_images) {
+  expect_symmetric(checked(tailor::sew(panels_of("waistcoat", 0.01), seams_of("waistcoat"))).garment);
+  expect_symmetric(checked(tailor::sew(cut("waistcoat", spec<tailor::MeshParams>("waistcoat", "lined_mesh"), 0.01), spec<tailor::SewParams>("waistcoat", "lined_seams"))).garment);
 }
 
 TEST(waistcoat, lined_is_a_closed_bag_with_six_buttons) {

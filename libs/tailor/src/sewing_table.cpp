@@ -11,6 +11,8 @@ namespace toile::tailor {
 namespace {
 
 double weft(const mesh::Panel& panel) { return panel.cell_weft > 0 ? panel.cell_weft : 0.01; }
+/// Panels that are turned over are worked on as their plain twins, so that both get the same triangles to the last bit.
+double side(const mesh::Panel& panel) { return panel.mirrored ? -1 : 1; }
 double warp(const mesh::Panel& panel) { return panel.cell_warp > 0 ? panel.cell_warp : 0.01; }
 
 int faces_at(const LocalMesh& mesh, int a, int b) {
@@ -52,7 +54,11 @@ SewingTable::SewingTable(const mesh::GarmentMesh& garment) : garment_(garment), 
   panel_.assign(garment.vertex_panel.data(), garment.vertex_panel.data() + garment.vertex_panel.size());
   for (std::size_t v = 0; v < count; ++v) mesh_.vertices[v].p = in_cells(static_cast<int>(v), garment.uv.row(static_cast<Eigen::Index>(v)));
   mesh_.triangles.resize(static_cast<std::size_t>(garment.face_count()));
-  for (Eigen::Index f = 0; f < garment.face_count(); ++f) mesh_.triangles[static_cast<std::size_t>(f)] = {garment.faces(f, 0), garment.faces(f, 1), garment.faces(f, 2)};
+  for (Eigen::Index f = 0; f < garment.face_count(); ++f) {
+    Triple& t = mesh_.triangles[static_cast<std::size_t>(f)];
+    t = {garment.faces(f, 0), garment.faces(f, 1), garment.faces(f, 2)};
+    if (turned(garment.face_panel[f])) std::swap(t[1], t[2]);
+  }
   build_stars(mesh_);
   rows_.resize(garment.runs.size());
   for (const auto& row : garment.run_vertices) rows_[static_cast<std::size_t>(row.run)].emplace_back(row.s, row.vertex);
@@ -92,13 +98,13 @@ SewingTable::SewingTable(const mesh::GarmentMesh& garment) : garment_(garment), 
 
 Point SewingTable::in_cells(int vertex, const Point& uv) const {
   const auto& panel = garment_.panels[static_cast<std::size_t>(panel_[vertex])];
-  return {uv.x() / weft(panel), uv.y() / warp(panel)};
+  return {side(panel) * uv.x() / weft(panel), uv.y() / warp(panel)};
 }
 
 Point SewingTable::in_metres(int vertex) const {
   const auto& panel = garment_.panels[static_cast<std::size_t>(panel_[vertex])];
   const Point& p = mesh_.vertices[vertex].p;
-  return {p.x() * weft(panel), p.y() * warp(panel)};
+  return {side(panel) * p.x() * weft(panel), p.y() * warp(panel)};
 }
 
 double SewingTable::grain(int run) const {
@@ -111,37 +117,54 @@ std::vector<PlanRun> SewingTable::plan_runs() const {
   for (std::size_t r = 0; r < rows_.size(); ++r) {
     for (const auto& [s, v] : rows_[r]) runs[r].row.push_back({s, v, held_[v] != 0});
     runs[r].cell = grain(static_cast<int>(r));
-    if (!garment_.runs[r].internal && rows_[r].size() > 1) runs[r].sense = sense_of(mesh_, rows_[r][0].second, rows_[r][1].second);
+    if (!garment_.runs[r].internal && rows_[r].size() > 1) runs[r].sense = (turned(garment_.runs[r].panel) ? -1 : 1) * sense_of(mesh_, rows_[r][0].second, rows_[r][1].second);
   }
   return runs;
 }
 
+/// Runs in the order in which they are worked on: those of panels that are turned over backwards, as their twins' edges lie.
+std::vector<std::size_t> SewingTable::order_of_runs() const {
+  std::vector<std::size_t> order(garment_.runs.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return garment_.runs[a].panel < garment_.runs[b].panel; });
+  for (auto from = order.begin(); from != order.end();) {
+    const int panel = garment_.runs[*from].panel;
+    const auto to = std::find_if(from, order.end(), [&](std::size_t r) { return garment_.runs[r].panel != panel || garment_.runs[r].internal; });
+    if (turned(panel)) std::reverse(from, to);
+    from = std::find_if(to, order.end(), [&](std::size_t r) { return garment_.runs[r].panel != panel; });
+  }
+  return order;
+}
+
 void SewingTable::carry_out(const std::vector<std::vector<PlanSlot>>& rows) {
   std::vector<Way> ways;
-  for (std::size_t r = 0; r < rows.size(); ++r) {
+  for (const std::size_t r : order_of_runs()) {
+    if (r >= rows.size() || rows[r].empty()) continue;
     const auto& planned = rows[r];
-    if (planned.empty()) continue;
+    const bool backwards = turned(garment_.runs[r].panel) && !garment_.runs[r].internal;
     std::vector<std::pair<double, int>> row;
-    std::size_t known = 0;
-    for (std::size_t k = 0; k < planned.size(); ++k) {
+    // Those that are put in lie between the nearest old ones, as far as the plan says.
+    const auto old_beside = [&](std::size_t k, int step) {
+      while (planned[k].vertex < 0) k = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(k) + step);
+      return k;
+    };
+    for (std::size_t i = 0; i < planned.size(); ++i) {
+      const std::size_t k = backwards ? planned.size() - 1 - i : i;
       const PlanSlot& slot = planned[k];
       int id = slot.vertex;
       if (id < 0) {
-        std::size_t next = k;
-        while (planned[next].vertex < 0) ++next;
-        const PlanSlot &u = planned[known], &w = planned[next];
+        const PlanSlot &u = planned[old_beside(k, backwards ? 1 : -1)], &w = planned[old_beside(k, backwards ? -1 : 1)];
         const double share = (slot.s_before - u.s_before) / (w.s_before - u.s_before);
         LocalVertex vertex;
         vertex.p = (1 - share) * mesh_.vertices[u.vertex].p + share * mesh_.vertices[w.vertex].p;
         vertex.mobility = Mobility::fixed;
         id = split_edge(mesh_, row.back().second, w.vertex, vertex);
         panel_.push_back(panel_[w.vertex]);
-      } else {
-        known = k;
       }
       row.emplace_back(slot.s, id);
       if (slot.vertex < 0 || slot.s != slot.s_before) ways.push_back({static_cast<int>(r), id, slot.s_before, slot.s});
     }
+    if (backwards) std::reverse(row.begin(), row.end());
     rows_[r] = std::move(row);
   }
   slide(ways);
@@ -286,6 +309,7 @@ std::pair<mesh::GarmentMesh, std::vector<int>> SewingTable::result(const std::ve
   for (const Triple& t : mesh_.triangles) {
     if (t[0] < 0) continue;
     Triple face{number[t[0]], number[t[1]], number[t[2]]};
+    if (turned(panel_[t[0]])) std::swap(face[1], face[2]);
     std::rotate(face.begin(), std::min_element(face.begin(), face.end()), face.end());
     faces.push_back(face);
   }

@@ -14,7 +14,8 @@
 
 namespace toile::tailor {
 
-/// The garment while it is being sewn. Positions are in cells of each panel.
+/// The garment while it is being sewn. Positions are in cells of each panel; panels that are turned over lie
+/// as their plain twins.
 class SewingTable {
  public:
   explicit SewingTable(const mesh::GarmentMesh& garment);
@@ -55,6 +56,8 @@ class SewingTable {
   Point in_cells(int vertex, const Point& uv) const;
   Point in_metres(int vertex) const;
   double grain(int run) const;
+  bool turned(int panel) const { return garment_.panels[static_cast<std::size_t>(panel)].mirrored; }
+  std::vector<std::size_t> order_of_runs() const;
   void slide(const std::vector<Way>& ways);
   void name_new_vertices();
 
