@@ -146,6 +146,36 @@ TEST_F(pipeline_runs, installed_programs_work_outside_the_repository_and_the_pac
   EXPECT_TRUE(log().starts_with("4 panels, 0.08")) << log();
 }
 
+TEST_F(pipeline_runs, from_a_coarse_grid_to_a_fine_one) {
+  const std::string file = (root / "pipelines/tee/pipeline.yaml").string();
+  ASSERT_TRUE(io::write_file(file, R"(garment: tee
+inputs:
+  pattern: ../../samples/patterns/tee.yaml
+  measurements: ../../samples/measurements/man178.yaml
+  shirting: ../../samples/fabrics/shirting.yaml
+stages:
+  form:           {tool: toile-form,   in: {measurements: $measurements}, spec: form.yaml}
+  panels:         {tool: toile-mesh,   in: {pattern: $pattern}, spec: mesh.yaml}
+  sewn:           {tool: toile-sew,    in: {garment: panels}, spec: seams.yaml}
+  layered:        {tool: toile-layer,  in: {garment: sewn, fabrics: $shirting}, spec: layers.yaml}
+  coarse_panels:  {tool: toile-mesh,   in: {pattern: $pattern}, spec: mesh.yaml, set: {scale: 2}}
+  coarse_sewn:    {tool: toile-sew,    in: {garment: coarse_panels}, spec: seams.yaml}
+  coarse_layered: {tool: toile-layer,  in: {garment: coarse_sewn, fabrics: $shirting}, spec: layers.yaml}
+  coarse_placed:  {tool: toile-place,  in: {garment: coarse_layered, support: form}, spec: placement.yaml}
+  placed:         {tool: toile-refine, in: {garment: layered, coarse: coarse_placed, support: form}}
+results: [placed]
+)").empty());
+  ASSERT_EQ(shell(command("a")), 0) << log();
+  const std::string placed = (root / "a/tee/placed.ply").string(), form = (root / "a/tee/form.ply").string();
+  const std::string bin = TOILE_BIN_DIR, to_log = " > " + (root / "log.txt").string() + " 2>&1";
+  EXPECT_EQ(shell(bin + "/toile-lint " + placed + " --strict true" + to_log), 0) << log();
+  // Refined once more onto its own grid it stays as it is, clear of itself and of the form.
+  EXPECT_EQ(shell(bin + "/toile-refine " + (root / "a/tee/layered.ply").string() + " " + placed + " --support " + form + " -o " + (root / "again.ply").string() + to_log), 0);
+  for (const char* fact : {"vertices_outside: 0\n", "vertices_moved_out: 0\n", "\nself_intersections: 0\n", "support_intersections: 0\n"})
+    EXPECT_NE(log().find(fact), std::string::npos) << fact << log();
+  EXPECT_EQ(shell(bin + "/toile-diff " + placed + " " + (root / "again.ply").string() + to_log), 0) << log();
+}
+
 TEST(samples, have_neither_faults_nor_doubtful_places) {
   const std::string log = testing::TempDir() + "toile_lint.txt";
   for (const auto& entry : fs::directory_iterator(fs::path(TOILE_SOURCE_DIR) / "samples" / "patterns")) {
