@@ -11,12 +11,12 @@ struct BodyStage {
 
   static stage::Description description() {
     return {.name = "toile-body",
-            .version = 1,
+            .version = 2,
             .summary = "Takes in a body or another support from a mesh file (OBJ, STL, PLY, glTF and others).",
             .example = "toile-body scan.stl -o body.ply --unit mm --up z --facing -y",
             .details = "The result is in metres, y up, facing +z. Unit and axes are as stated, never guessed; an implausible size is an error that says "
                        "which unit would fit. Vertices of exactly equal position become one. The surface has to be closed, with all faces looking outward "
-                       "(or ask for winding: outward). Such a body has no landmarks and no regions.",
+                       "(or ask for winding: outward), unless wrap asks for a closed surface round it. Such a body has no landmarks and no regions.",
             .inputs = {{.name = "body", .doc = "mesh file", .kind = stage::FileKind::any}},
             .output = stage::FileKind::support};
   }
@@ -32,6 +32,10 @@ struct BodyStage {
       const io::BodyPiece& p = body.pieces[i];
       run.report(fmt::format("piece_{}", i), fmt::format("{} vertices, {} faces, {:.6f} m3, x {:.3f}..{:.3f} y {:.3f}..{:.3f} z {:.3f}..{:.3f} m", p.vertices, p.faces,
                                                          p.volume, p.low[0], p.high[0], p.low[1], p.high[1], p.low[2], p.high[2]));
+    }
+    if (params.wrap > 0) {
+      run.report("open_edges", body.open_edges);
+      run.report("wrap_distance", body.wrap_distance, "m");
     }
     const auto size = (body.mesh.x.colwise().maxCoeff() - body.mesh.x.colwise().minCoeff()).eval();
     run.report("width", size[0], "m");

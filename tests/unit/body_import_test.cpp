@@ -284,3 +284,78 @@ TEST(body_import, winding_can_be_mended) {
   ASSERT_TRUE(turned);
   EXPECT_NEAR(mesh::volume(turned->mesh.x, turned->mesh.faces), 0.192, 1e-12);
 }
+
+namespace {
+
+/// A closed prism of 24 sides about y, radius 0.2 m, from y = 0 to 1; its lid is left out if `open`.
+std::pair<mesh::Points3, mesh::Triangles> drum(bool open) {
+  constexpr int n = 24;
+  mesh::Points3 x(2 * n + 2, 3);
+  for (int i = 0; i < n; ++i) {
+    const double a = 2 * M_PI * i / n;
+    x.row(i) << 0.2 * std::cos(a), 0, -0.2 * std::sin(a);
+    x.row(n + i) << 0.2 * std::cos(a), 1, -0.2 * std::sin(a);
+  }
+  x.row(2 * n) << 0, 0, 0;
+  x.row(2 * n + 1) << 0, 1, 0;
+  mesh::Triangles faces((open ? 3 : 4) * n, 3);
+  for (int i = 0; i < n; ++i) {
+    const int j = (i + 1) % n;
+    faces.row(3 * i) << i, j, n + j;
+    faces.row(3 * i + 1) << i, n + j, n + i;
+    faces.row(3 * i + 2) << 2 * n, j, i;
+    if (!open) faces.row(3 * n + i) << 2 * n + 1, n + i, n + j;
+  }
+  return {x, faces};
+}
+
+}  // namespace
+
+TEST(body_import, a_wrap_bridges_holes_narrower_than_it_and_names_wider_ones) {
+  const auto [x, faces] = drum(true);
+  io::BodyImportParams p;
+  EXPECT_EQ(codes(io::import_body(x, faces, "drum", p)), "open_surface");
+  const double whole = 12 * std::sin(2 * M_PI / 24) * 0.04;  // of the prism with its lid
+  p.wrap_offset = 2e-3;
+  for (const double width : {0.45, 0.8}) {
+    p.wrap = width;
+    const auto body = io::import_body(x, faces, "drum", p);
+    ASSERT_TRUE(body) << to_string(body.issues()[0]);
+    EXPECT_EQ(body->open_edges, 24);
+    const double volume = mesh::volume(body->mesh.x, body->mesh.faces);
+    EXPECT_GT(volume, 0.9 * whole) << width;   // the open end is bridged by a dent
+    EXPECT_LT(volume, 1.05 * whole) << width;  // and 2 mm are added all round
+    // The open end apart, no vertex is nearer than the offset, or farther.
+    EXPECT_GE(body->wrap_distance, p.wrap_offset - 1e-6);
+    for (Eigen::Index i = 0; i < body->mesh.x.rows(); ++i) {
+      const Eigen::RowVector3d q = body->mesh.x.row(i);
+      if (q.y() < 0.1 || q.y() > 0.9) continue;
+      const double r = std::hypot(q.x(), q.z());
+      EXPECT_GT(r, 0.2 * std::cos(M_PI / 24) + 0.99 * p.wrap_offset);
+      EXPECT_LT(r, 0.2 + 1.01 * p.wrap_offset);
+    }
+  }
+  p.wrap = 0.3;
+  EXPECT_EQ(codes(io::import_body(x, faces, "drum", p)), "wrap_enters");
+}
+
+TEST(body_import, a_wrap_takes_pieces_that_cross_and_faces_turned_inward) {
+  auto [x, faces] = drum(false);
+  for (Eigen::Index f = 0; f < faces.rows(); f += 3) std::swap(faces(f, 1), faces(f, 2));
+  mesh::Points3 both(2 * x.rows(), 3);
+  both << x, (0.5 * x).rowwise() + Eigen::RowVector3d(0.15, 0.25, 0);  // a half-size drum that sticks out at +x
+  mesh::Triangles all(2 * faces.rows(), 3);
+  all << faces, faces.array() + static_cast<int>(x.rows());
+  io::BodyImportParams p;
+  EXPECT_EQ(codes(io::import_body(both, all, "drums", p)), "not_oriented");
+  p.wrap = 0.04;
+  const auto body = io::import_body(both, all, "drums", p);
+  ASSERT_TRUE(body) << to_string(body.issues()[0]);
+  EXPECT_EQ(body->open_edges, 0);
+  const auto again = io::import_body(both, all, "drums", p);
+  ASSERT_TRUE(again);
+  EXPECT_EQ(body->mesh.x, again->mesh.x);
+  EXPECT_EQ(body->mesh.faces, again->mesh.faces);
+  EXPECT_NEAR(body->mesh.x.col(0).maxCoeff(), 0.25 + p.wrap_offset, 1e-4);
+  EXPECT_TRUE(ok(mesh::validate(body->mesh)));
+}

@@ -1,5 +1,6 @@
 #include "toile/io/body_import.h"
 
+#include "toile/geometry/wrap.h"
 #include "toile/mesh/topology.h"
 
 #include <assimp/scene.h>
@@ -213,6 +214,28 @@ void check_surface(const mesh::Points3& x, const mesh::Triangles& faces, const s
   }
 }
 
+int open_edges(const mesh::Triangles& faces) {
+  std::map<std::pair<int, int>, int> uses;
+  for (Eigen::Index f = 0; f < faces.rows(); ++f) {
+    for (int k = 0; k < 3; ++k) {
+      const int a = faces(f, k), b = faces(f, (k + 1) % 3);
+      ++uses[{std::min(a, b), std::max(a, b)}];
+    }
+  }
+  return static_cast<int>(std::count_if(uses.begin(), uses.end(), [](const auto& u) { return u.second == 1; }));
+}
+
+/// A wrap that went in through a hole lines both sides of the body, with hardly any volume between them. The volume of an open
+/// piece about its own middle is good enough to tell.
+void check_wrap(const mesh::Points3& x, const mesh::Triangles& faces, double largest_piece, const std::string& name, const BodyImportParams& params, Issues& issues) {
+  const double volume = mesh::volume(x, faces);
+  if (volume >= 0.8 * largest_piece) return;
+  issues.push_back(Issue{"wrap_enters", {.file = name, .item = "wrap"},
+                         fmt::format("the closed surface holds {:.3g} m3, the largest piece about {:.3g} m3: it goes in through a hole wider than {:.3g} mm and lines the inside",
+                                     volume, largest_piece, 1000 * params.wrap),
+                         "raise wrap above the width of the largest hole"});
+}
+
 }  // namespace
 
 Result<ImportedBody> import_body(const std::string& path, const BodyImportParams& params) {
@@ -290,7 +313,7 @@ Result<ImportedBody> import_body(mesh::Points3 x, mesh::Triangles faces, const s
   if (faces.rows() == 0) return Issue{"cannot_read", {.file = name}, "every face is degenerate", "export the body again"};
 
   check_size(x, name, params, issues);
-  if (params.winding == Winding::outward) agree(faces);
+  if (params.winding == Winding::outward || params.wrap > 0) agree(faces);
 
   // Pieces, largest first.
   const std::vector<int> piece = piece_of_faces(faces, static_cast<int>(x.rows()));
@@ -350,11 +373,19 @@ Result<ImportedBody> import_body(mesh::Points3 x, mesh::Triangles faces, const s
     parts.resize(1);
   }
 
-  check_surface(x, faces, name, issues);
-  const bool closed = std::none_of(issues.begin(), issues.end(), [](const Issue& i) { return i.code != "implausible_size"; });
-  if (closed) {
+  if (params.wrap > 0) {
+    if (!issues.empty()) return issues;
+    body.open_edges = open_edges(faces);
+    geometry::Wrap closed = geometry::wrap(x, faces, params.wrap, params.wrap_offset);
+    x = std::move(closed.x);
+    faces = std::move(closed.faces);
+    check_wrap(x, faces, std::abs(parts[0].facts.volume), name, params, issues);
+    body.wrap_distance = closed.farthest;
+  } else {
+    check_surface(x, faces, name, issues);
+    const bool sound = std::none_of(issues.begin(), issues.end(), [](const Issue& i) { return i.code != "implausible_size"; });
     for (const Part& part : parts) {
-      if (part.facts.volume > 0) continue;
+      if (!sound || part.facts.volume > 0) continue;
       const Vector3d middle((part.facts.low[0] + part.facts.high[0]) / 2, (part.facts.low[1] + part.facts.high[1]) / 2, (part.facts.low[2] + part.facts.high[2]) / 2);
       issues.push_back(Issue{"inside_out", {.file = name}, fmt::format("the faces of the piece around {} ({} faces) look inward", place(middle), part.facts.faces),
                              "turn them, or ask for winding: outward"});

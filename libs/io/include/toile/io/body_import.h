@@ -27,6 +27,8 @@ struct BodyImportParams {
   Winding winding = Winding::check;
   Pieces pieces = Pieces::all;
   Standing standing = Standing::keep;
+  double wrap = 0;
+  double wrap_offset = 1e-3;
   double smallest_size = 0.3;
   double largest_size = 3.0;
 
@@ -37,6 +39,8 @@ struct BodyImportParams {
     f(&BodyImportParams::winding, {.key = "winding", .doc = "refuse faces that look inward, or turn them"});
     f(&BodyImportParams::pieces, {.key = "pieces", .doc = "keep every connected piece, or only the one of largest volume"});
     f(&BodyImportParams::standing, {.key = "standing", .doc = "keep the height, or move the lowest point to y = 0"});
+    f(&BodyImportParams::wrap, {.key = "wrap", .doc = "draw a closed surface round the body that bridges holes, gaps and overlaps up to this width; 0: the body has to be closed itself", .unit = "m", .min = 0, .max = 10});
+    f(&BodyImportParams::wrap_offset, {.key = "wrap_offset", .doc = "how far outside the body that surface lies", .unit = "m", .min = 1e-5, .max = 1});
     f(&BodyImportParams::smallest_size, {.key = "smallest_size", .doc = "the body's largest extent is at least this", .unit = "m", .min = 1e-6, .max = 1e4});
     f(&BodyImportParams::largest_size, {.key = "largest_size", .doc = "the body's largest extent is at most this", .unit = "m", .min = 1e-6, .max = 1e4});
     f.check([](const BodyImportParams& p, Issues& issues) {
@@ -61,11 +65,13 @@ struct ImportedBody {
   std::vector<BodyPiece> pieces;  ///< of the file, largest volume first
   int joined_corners = 0;       ///< corners and vertices of equal position that became one vertex
   int dropped_faces = 0;          ///< with a repeated vertex, after that
+  int open_edges = 0;             ///< of the file, if a wrap was asked for: edges with a face on one side only
+  double wrap_distance = 0;       ///< largest distance of the wrap's vertices from the file's surface [m]
 };
 
 /// Reads a mesh file. Vertices of exactly equal position are one vertex.
 /// error  Issue "cannot_read" (not there, not a mesh, no faces), "implausible_size", "open_surface", "not_manifold",
-///        "inside_out", each with counts and places; no guess is made on unit or axes
+///        "inside_out", "wrap_enters" (a hole wider than params.wrap, so that the wrap lines the inside), each with counts and places; no guess is made on unit or axes
 Result<ImportedBody> import_body(const std::string& path, const BodyImportParams& params);
 
 /// The same from triangles in the file's own coordinates (one row of x a corner or a vertex).
