@@ -117,3 +117,18 @@ TEST(placed_garments, jacket_has_its_lapels_turned_and_its_sleeves_on) {
   }
   EXPECT_EQ(lapels, 2);
 }
+
+TEST(placed_garments, one_spec_serves_three_sizes) {
+  const auto params = spec<placement::PlaceParams>("tee", "placement.yaml");
+  for (const double scale : {0.85, 1.12}) {
+    SCOPED_TRACE(scale);
+    expect_placed(checked(placement::place(layered("tee", {"shirting"}, kCell, scale), form_of("tee", "man178", scale), params)), params, 0.007, 0.02);
+  }
+  // the same garment, loose on a smaller form
+  expect_placed(checked(placement::place(layered("tee", {"shirting"}, kCell), form_of("tee", "man178", 0.94), params)), params, 0.007, 0.02);
+  const auto jacket = spec<placement::PlaceParams>("jacket", "placement.yaml");
+  for (const double scale : {0.9, 1.1}) {
+    SCOPED_TRACE(scale);
+    expect_placed(checked(placement::place(layered("jacket", {"suiting", "fusible_canvas"}, kCell, scale), form_of("jacket", "man178", scale), jacket)), jacket, 0.011, 0.055);
+  }
+}

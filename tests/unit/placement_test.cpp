@@ -7,6 +7,7 @@
 #include "toile/mesh/topology.h"
 #include "toile/placement/coarse.h"
 #include "toile/placement/developable.h"
+#include "toile/placement/mirror.h"
 #include "toile/placement/relax.h"
 #include "toile/placement/report.h"
 
@@ -325,6 +326,33 @@ TEST(layout, says_what_it_cannot_place) {
   EXPECT_NEAR(good->panels[0](Vector2d(0.1, 0.66)).y(), frame->waist, 1e-9);
 }
 
+TEST(layout, a_point_goes_to_a_point_of_the_support) {
+  const auto g = tube(26, 15);
+  const auto frame = body_frame(man());
+  const double height = frame->waist - 0.05;
+  const Points2& hull = frame->section(height).hull;
+  Eigen::Index side = 0;
+  hull.col(1).maxCoeff(&side);
+  PlaceParams params;
+  params.panels["front"].point = "top";
+  params.panels["front"].to = {hull(side, 1), height, hull(side, 0)};  // the left side
+  const auto layout = make_layout(g, fold_flat(g), man(), *frame, params);
+  ASSERT_TRUE(layout.has_value());
+  const Vector2d top = layout->panels[0](Vector2d(0.26, 0.3));  // the middle of the upper edge
+  EXPECT_NEAR(top.y(), height, 1e-9);
+  EXPECT_NEAR(top.x() / layout->girth_trunk, 0.25, 0.03);
+  // and on the mirrored side with everything mirrored
+  params.panels["front"].to[0] = -params.panels["front"].to[0];
+  const auto right = make_layout(g, fold_flat(g), man(), *frame, params);
+  EXPECT_NEAR(std::abs(right->panels[0](Vector2d(0.26, 0.3)).x()) / right->girth_trunk, 0.25, 0.03);
+
+  params.panels["front"].to = {0, height, 1};
+  const auto off = make_layout(g, fold_flat(g), man(), *frame, params);
+  ASSERT_FALSE(off.has_value());
+  EXPECT_EQ(codes(off.issues()), std::vector<std::string>{"off_support"});
+  EXPECT_EQ(off.issues().front().place.item, "panels.front.to");
+}
+
 // ---- coarse mesh
 
 TEST(coarse, keeps_area_seams_and_flat_states) {
@@ -443,6 +471,36 @@ TEST(place, mirrored_body_and_garment_give_the_mirrored_result_in_its_figures) {
   ASSERT_TRUE(a.has_value() && b.has_value());
   EXPECT_NEAR(a->report.mean_seam_gap, b->report.mean_seam_gap, 0.003);
   EXPECT_NEAR(seam_mean(a->report, g, "shoulder_left"), seam_mean(b->report, g, "shoulder_right"), 0.006);
+}
+
+TEST(place, mirrored_garment_on_a_mirrored_body_gives_the_mirrored_result_to_the_last_bit) {
+  // no symmetry to rely on: one shoulder lower, the body turned a little, a tee with one longer sleeve
+  mesh::SupportMesh body = man();
+  for (Eigen::Index v = 0; v < body.x.rows(); ++v) {
+    if (body.x(v, 0) > 0) body.x(v, 1) -= 0.05 * body.x(v, 0);
+  }
+  auto g = boxy_tee();
+  for (Eigen::Index v = 0; v < g.vertex_count(); ++v) {
+    if (g.vertex_panel[v] == 3) g.uv(v, 1) *= 1.1;
+  }
+  PlaceParams params;
+  params.closing_steps = 20, params.swelling_steps = 30, params.settling_steps = 20, params.fine_steps = 10, params.polishing_steps = 20;
+  params.panels["front"].shift = {0.01, 0};
+  const auto a = place(g, body, params), b = place(mirrored(g), mirrored(body), mirrored(params));
+  ASSERT_TRUE(a.has_value() && b.has_value());
+  EXPECT_EQ((mirrored(a->garment).x - b->garment.x).cwiseAbs().maxCoeff(), 0);
+  EXPECT_EQ(a->report.rms_strain, b->report.rms_strain);
+  EXPECT_EQ(a->garment.face_columns.at("warp_angle").reals[5], -b->garment.face_columns.at("warp_angle").reals[5]);
+  EXPECT_NE(a->garment.face_columns.at("warp_angle").reals[5], 0);
+}
+
+TEST(place, refuses_free_layers) {
+  auto g = boxy_tee();
+  g.free_layers.push_back({.id = 0, .name = "yoke", .panels = {1}, .on = {0}});
+  const auto placed = place(g, man(), {});
+  ASSERT_FALSE(placed.has_value());
+  EXPECT_EQ(codes(placed.issues()), std::vector<std::string>{"free_layer"});
+  EXPECT_NE(placed.issues().front().what.find("back"), std::string::npos);
 }
 
 TEST(place, same_bytes_at_any_thread_count) {

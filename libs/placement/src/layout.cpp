@@ -1,6 +1,7 @@
 #include "toile/placement/layout.h"
 
 #include "toile/base/text.h"
+#include "toile/contact/support_field.h"
 
 #include <algorithm>
 #include <cmath>
@@ -15,6 +16,7 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr double kOpen = 0.006;  // seams of neighbours start so far apart at least [m]
+constexpr double kNear = 0.05;  // a point to go to is so far from the support at most [m]
 constexpr double kBand = 3;  // a panel longer than this times its width is a band: its seams say how it is turned
 
 // Welds of one seam between two panels; or the fasteners between them (seam -1), which say how far round panels go that no
@@ -107,6 +109,34 @@ Region region_from_name(const std::string& name) {
   if (has("back")) return Region::torso_back;
   if (has("side") || has("bodice") || has("skirt") || has("yoke")) return Region::torso;
   return Region::automatic;
+}
+
+// Which part of the way round the trunk (from the front to the left) lies before a point: by the tape of the section at its height.
+double place_round(const BodyFrame& frame, const Eigen::Vector3d& p) {
+  const Points2& hull = frame.section(p.y()).hull;
+  const Vector2d middle(0.5 * (hull.col(0).minCoeff() + hull.col(0).maxCoeff()), frame.x_mid);
+  const auto angle_of = [&](const Vector2d& q) { return std::atan2(q.y() - middle.y(), q.x() - middle.x()); };
+  const double wanted = angle_of({p.z(), p.x()});
+  // walk round from the front, counter-clockwise
+  const Eigen::Index n = hull.rows();
+  double total = 0, before = 0, front = 0;
+  bool has_before = false, has_front = false;
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Vector2d a = hull.row(i), b = hull.row((i + 1) % n);
+    const double length = (b - a).norm();
+    const auto crossing = [&](double angle, bool& has, double& where) {
+      const Vector2d out(std::cos(angle), std::sin(angle)), left(-out.y(), out.x());
+      const double sa = left.dot(a - middle), sb = left.dot(b - middle);
+      if (has || sa > 0 || sb <= 0 || out.dot(b - middle) <= 0) return;
+      has = true;
+      where = total + length * sa / (sa - sb);
+    };
+    crossing(0, has_front, front);
+    crossing(wanted, has_before, before);
+    total += length;
+  }
+  const double part = (before - front) / total;
+  return part - std::floor(part);
 }
 
 }  // namespace
@@ -306,17 +336,18 @@ Result<Layout> make_layout(const mesh::GarmentMesh& garment, const FoldedFlat& f
     // Heights.
     const std::map<std::string, double> levels{{"neck", frame.neck},   {"armpit", frame.armpit}, {"chest", frame.chest.value_or(frame.armpit)},
                                                {"waist", frame.waist}, {"hips", frame.hips},     {"crotch", frame.crotch}};
+    const contact::SupportField body(contact::make_surface(static_cast<int>(support.x.rows()), support.faces), support.x);
     for (const auto& group : groups) {
       std::optional<double> lift;
       for (int p : group) {
         const PanelSpec* spec = specs[static_cast<std::size_t>(p)];
         if (!spec || !spec->point) continue;
         const PanelLayout& panel = layout.panels[static_cast<std::size_t>(p)];
-        double height = 0;
+        Vector2d own = Vector2d::Zero();
         bool known = false;
         for (const auto& point : garment.points) {
           if (point.panel == p && point.name == *spec->point) {
-            height = panel(uv_of(flat, point.vertex)).y();
+            own = panel(uv_of(flat, point.vertex));
             known = true;
           }
         }
@@ -324,7 +355,7 @@ Result<Layout> make_layout(const mesh::GarmentMesh& garment, const FoldedFlat& f
           for (const auto& run : garment.runs) {
             if (run.panel != p || run.name != *spec->point) continue;
             const auto ids = mesh::run_vertex_ids(garment, run.id);
-            for (int v : ids) height += panel(uv_of(flat, v)).y() / static_cast<double>(ids.size());
+            for (int v : ids) own += panel(uv_of(flat, v)) / static_cast<double>(ids.size());
             known = !ids.empty();
           }
         }
@@ -334,6 +365,21 @@ Result<Layout> make_layout(const mesh::GarmentMesh& garment, const FoldedFlat& f
           for (const auto& run : garment.runs) if (run.panel == p) candidates.push_back(run.name);
           issues.push_back({.code = "unknown_anchor", .place = {.item = "panels." + names[static_cast<std::size_t>(p)] + ".point"},
                             .what = "the panel has no point or edge '" + *spec->point + "'", .remedy = suggestion(*spec->point, candidates)});
+          continue;
+        }
+        if (!spec->to.empty()) {
+          const Eigen::Vector3d to(spec->to[0], spec->to[1], spec->to[2]);
+          const double distance = std::abs(body.nearest(to).distance);
+          if (distance > kNear) {
+            issues.push_back({.code = "off_support", .place = {.item = "panels." + names[static_cast<std::size_t>(p)] + ".to"},
+                              .what = fmt::format("the point ({:.3f}, {:.3f}, {:.3f}) m is {:.0f} mm from the support's surface", to.x(), to.y(), to.z(), 1e3 * distance),
+                              .remedy = "give a point on it, in metres; toile-info lists the support's size and landmarks"});
+            continue;
+          }
+          lift = to.y() - own.y();
+          double round = place_round(frame, to) * girth - own.x();
+          round -= girth * std::round(round / girth);
+          shift_group(group, {round, 0});
           continue;
         }
         const std::string at = spec->at.value_or("waist");
@@ -348,7 +394,7 @@ Result<Layout> make_layout(const mesh::GarmentMesh& garment, const FoldedFlat& f
                             .what = "the support has no landmark or level '" + at + "'", .remedy = suggestion(at, candidates)});
           continue;
         }
-        lift = *target - height;
+        lift = *target - own.y();
       }
       if (!lift) {
         // The shoulder seams rest on the shoulders: on the outline of the body seen from the front.

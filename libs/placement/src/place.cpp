@@ -8,6 +8,7 @@
 #include "toile/placement/attach.h"
 #include "toile/placement/coarse.h"
 #include "toile/placement/developable.h"
+#include "toile/placement/mirror.h"
 #include "toile/placement/relax.h"
 #include "toile/placement/subset.h"
 
@@ -210,7 +211,7 @@ Result<Start> bend(const mesh::GarmentMesh& garment, const FoldedFlat& folded, c
                    .remedy = "check the anchors (point, at, shift) and the units of pattern and support", .category = Category::input};
     }
     start.flattening.z_middle = 0.5 * (z_low + z_high);
-    const double margin = std::max(2 * params.offset, 0.008);
+    const double margin = garment.welds.empty() ? params.offset : std::max(2 * params.offset, 0.008);
     double girth = layout.girth_trunk;
     const Points2 full = trunk_hull(frame, low, high);
     const auto hull_at = [&](double flatten) { return flattened_hull(full, flatten, start.flattening.z_middle); };
@@ -218,7 +219,7 @@ Result<Start> bend(const mesh::GarmentMesh& garment, const FoldedFlat& folded, c
       return (girth - polygon_perimeter(hull_at(flatten))) / (2 * std::numbers::pi);
     };
     if (girth <= 0) girth = std::max(a_high - a_low, polygon_perimeter(hull_at(start.flattening.depth)) + 2 * std::numbers::pi * margin);
-    while (spare(start.flattening.depth) < margin && start.flattening.depth > 0.06) start.flattening.depth *= 0.95;
+    while (spare(start.flattening.depth) < margin - 1e-9 && start.flattening.depth > 0.06) start.flattening.depth *= 0.95;
     // Level by level, up to the lowest point of an armhole: cloth against body.
     if (layout.girth_trunk > 0) {
       double ceiling = frame.armpit;
@@ -376,7 +377,17 @@ Result<Start> bend(const mesh::GarmentMesh& garment, const FoldedFlat& folded, c
   return start;
 }
 
-Result<Placed> place(const mesh::GarmentMesh& sewn, const mesh::SupportMesh& support, const PlaceParams& params, const std::function<void(double)>& progress) {
+namespace {
+
+Result<Placed> place_as_given(const mesh::GarmentMesh& sewn, const mesh::SupportMesh& support, const PlaceParams& params, const std::function<void(double)>& progress) {
+  if (!sewn.free_layers.empty()) {
+    Issues issues;
+    for (const mesh::FreeLayer& layer : sewn.free_layers) {
+      issues.push_back({.code = "free_layer", .place = {.item = "free layer " + layer.name}, .what = "layers with a grid of their own (" + names_of(sewn, layer.panels) + ") cannot be placed",
+                        .remedy = "place the garment without these panels (toile-layer without `free`, toile-mesh with `leave_out`)"});
+    }
+    return issues;
+  }
   const std::vector<int> stuck = stuck_folds(sewn);
   const mesh::GarmentMesh garment = without_folds(sewn, stuck);
   TOILE_TRY(const BodyFrame frame, body_frame(support));
@@ -411,9 +422,10 @@ Result<Placed> place(const mesh::GarmentMesh& sewn, const mesh::SupportMesh& sup
   std::vector<char> first(garment.panels.size());
   for (std::size_t p = 0; p < first.size(); ++p) first[p] = layout.panels[p].part != Part::attached;
   // First the tubes while the support swells in them, then what stands on them.
-  // Cloth that is rolled or folded already needs no further work to stay so; a garment without either keeps to flat.
+  // Cloth that is rolled or folded already needs no further work to stay so, as a panel that no seam holds; other garments
+  // keep to flat.
   const bool shaped = std::any_of(layout.panels.begin(), layout.panels.end(), [](const PanelLayout& p) { return p.part == Part::attached; }) ||
-                      !fold_lines(garment).empty();
+                      !fold_lines(garment).empty() || garment.welds.empty();
   const auto rolled_of = [&](const Points3& x) { return shaped ? x : Points3(); };
   const auto assemble = [&](const mesh::GarmentMesh& mesh, const FoldedFlat& flat, const Points3& bent) {
     RelaxOptions stage = options;
@@ -429,6 +441,14 @@ Result<Placed> place(const mesh::GarmentMesh& sewn, const mesh::SupportMesh& sup
     stage.flattening.depth = 1;
     stage.swelling_steps = 0;
     return relax(mesh, x, support, stage);
+  };
+  // Nothing to draw together: where the bent panels lie clear of the support and of one another, they stay as they were rolled.
+  const auto rolled_is_clear = [&] {
+    if (!garment.welds.empty() || !garment.fasteners.empty() || start.flattening.depth < 1) return false;
+    mesh::GarmentMesh bent = garment;
+    bent.x = start.x;
+    const Report report = measure(bent, support);
+    return report.smallest_gap >= params.clearance && report.self_intersections.empty() && report.support_intersections.empty();
   };
   // From the coarsest mesh to the given one, each about a third as fine as the next.
   std::vector<double> sizes;
@@ -454,12 +474,13 @@ Result<Placed> place(const mesh::GarmentMesh& sewn, const mesh::SupportMesh& sup
   options.progress = [&](double f) {
     if (progress) progress((done + f) / (levels + 1));
   };
-  Points3 x = assemble(*meshes.back().mesh, meshes.back().flat, meshes.back().bent);
+  const bool stays = rolled_is_clear();
+  Points3 x = stays ? start.x : assemble(*meshes.back().mesh, meshes.back().flat, meshes.back().bent);
   options.flattening.depth = 1;
   options.closing_steps = 0;
   options.swelling_steps = 0;
   options.settling_steps = params.fine_steps;
-  for (std::size_t i = meshes.size(); i-- > 0;) {
+  for (std::size_t i = stays ? 0 : meshes.size(); i-- > 0;) {
     done += 1;
     if (i + 1 < meshes.size() || meshes.size() == 1) {
       if (shaped) options.rolled = meshes[i].bent;
@@ -505,6 +526,21 @@ Result<Placed> place(const mesh::GarmentMesh& sewn, const mesh::SupportMesh& sup
     finding("self_intersection", fmt::format("{} pairs of cloth triangles cut one another ({})", report.self_intersections.size(), between(report.self_intersections, false)),
             "give more steps, or move panels apart (shift); the simulation takes crossings of a few triangles apart");
   }
+  return placed;
+}
+
+}  // namespace
+
+// Work is done on one of the two mirror images, so that a mirrored garment on a mirrored support gives the mirrored result
+// to the last bit.
+Result<Placed> place(const mesh::GarmentMesh& sewn, const mesh::SupportMesh& support, const PlaceParams& params, const std::function<void(double)>& progress) {
+  if (!left_handed(support)) return place_as_given(sewn, support, params, progress);
+  TOILE_TRY(Placed placed, place_as_given(mirrored(sewn), mirrored(support), mirrored(params), progress));
+  const Points3 x = mirrored(placed.garment).x;
+  placed.garment = sewn;
+  placed.garment.x = x;
+  for (double& angle : placed.report.face_warp_angle) angle = -angle;
+  add_columns(placed.garment, placed.report);
   return placed;
 }
 

@@ -45,14 +45,25 @@ struct PanelSpec {
   Region region = Region::automatic;
   std::optional<std::string> point;  ///< point or edge of the panel that goes to `at`
   std::optional<std::string> at;     ///< landmark or level of the support
+  std::vector<double> to;            ///< or a point on it [m]
   std::array<double, 2> shift{0, 0};
   double turn = 0;
   static void describe(auto& f) {
     f(&PanelSpec::region, {.key = "region", .doc = "part of the support that the panel goes on; auto: from its name and seams"});
     f(&PanelSpec::point, {.key = "point", .doc = "point or edge of the panel whose height is set by `at`"});
     f(&PanelSpec::at, {.key = "at", .doc = "landmark of the support, or one of the levels neck, shoulder, armpit, chest, waist, hips, crotch"});
+    f(&PanelSpec::to, {.key = "to", .doc = "instead of `at`, a point (x, y, z) on the trunk of the support: `point` goes to its height and to its place round the body", .unit = "m"});
     f(&PanelSpec::shift, {.key = "shift", .doc = "moved further round the body (towards its left side from the front) and up", .unit = "m", .min = -1, .max = 1});
     f(&PanelSpec::turn, {.key = "turn", .doc = "turned in its plane, counter-clockwise seen from outside", .unit = "rad", .min = -3.2, .max = 3.2});
+    f.check([](const PanelSpec& p, Issues& issues) {
+      if (!p.to.empty() && p.to.size() != 3) {
+        issues.push_back({.code = "bad_range", .place = {.item = "to"}, .what = fmt::format("a point has three coordinates, not {}", p.to.size()), .remedy = "give [x, y, z]"});
+      }
+      if (!p.to.empty() && (p.at || !p.point)) {
+        issues.push_back({.code = "bad_range", .place = {.item = "to"}, .what = p.at ? "`at` and `to` both say where the point goes" : "nothing says which point of the panel goes there",
+                          .remedy = p.at ? "leave one of them out" : "give `point`, a point or edge of the panel"});
+      }
+    });
   }
 };
 
