@@ -1,6 +1,10 @@
 #include "toile/dynamics/simulate.h"
 #include "toile/stage/stage.h"
 
+#include <fmt/format.h>
+
+#include <array>
+
 using namespace toile;
 
 namespace {
@@ -10,7 +14,7 @@ struct SimulateStage {
 
   static stage::Description description() {
     return {.name = "toile-simulate",
-            .version = 5,
+            .version = 6,
             .summary = "Lets a placed garment hang to rest on a body, or move in time.",
             .example = "toile-simulate placed.ply --support form.ply -o draped.ply",
             .details = "Open seams are drawn together first; then the garment relaxes until the sum of all net forces is a given part of its "
@@ -40,6 +44,12 @@ struct SimulateStage {
     run.report("iterations", report.iterations);
     run.report("solver_iterations", report.solver_iterations);
     if (params.mode == dynamics::Mode::motion) run.report("simulated_time", report.simulated_time, "s");
+    if (params.mode == dynamics::Mode::motion) run.report("unconverged_steps", report.unconverged_steps);
+    for (const dynamics::Reaction& r : report.reactions) {
+      constexpr std::array axes{"x", "y", "z"};
+      for (int c = 0; c < 3; ++c) run.report(fmt::format("force_{}_{}", axes[static_cast<std::size_t>(c)], r.name), r.force[c], "N");
+      for (int c = 0; c < 3; ++c) run.report(fmt::format("moment_{}_{}", axes[static_cast<std::size_t>(c)], r.name), r.moment[c], "N*m");
+    }
     run.report("max_strain_warp", report.strain_warp_max);
     run.report("max_strain_weft", report.strain_weft_max);
     run.report("max_shear", report.shear_max, "rad");
@@ -57,6 +67,7 @@ struct SimulateStage {
     run.report("bending_energy", report.bending_energy, "J");
     run.report("potential_energy", report.potential_energy, "J");
     stage::Output output{std::move(result->garment), std::move(result->findings), {}};
+    if (!params.record.empty()) output.side_files.push_back({params.record, std::move(result->record)});
     if (!params.log.empty()) output.side_files.push_back({params.log, std::move(result->log)});
     return output;
   }

@@ -4,12 +4,14 @@
 #include "toile/contact/exact.h"
 #include "toile/contact/search.h"
 #include "toile/contact/support_field.h"
+#include "toile/dynamics/constraints.h"
 #include "toile/dynamics/contact_force.h"
 #include "toile/dynamics/linear_solver.h"
 #include "toile/mechanics/sheet.h"
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -37,6 +39,8 @@ constexpr double step_max = 2;        // [s]
 constexpr double quiet_move = 2e-4;   // below it the step grows [m]
 constexpr int stall_limit = 30;       // iterations without a better residual
 constexpr double solved_well = 0.25;  // part of the net force left after one iteration, below it the step grows
+// A held particle is where its path wants it [m].
+constexpr double at_target = 1e-9;
 
 /// Node ids: vertices whose welds are closed share one.
 Ids node_ids(const GarmentMesh& garment, const std::vector<char>& weld_closed) {
@@ -82,18 +86,27 @@ class Run {
   bool interrupted() const { return hooks_.interrupted && hooks_.interrupted(); }
 
   Issues build(const Ids& node_of_vertex);
-  Issues find_fixed();
+  Issues find_constraints();
+  void hold_nodes();
   void clear_start();
   void evaluate(const Points3& x, bool with_matrix);
   double objective(const Points3& x);
   double static_residual() const;
-  bool iterate(double step);
+  double force_scale() const;
+  double net_force(Eigen::Index node, const Eigen::RowVector3d& gradient) const;
+  std::vector<Float4> prescribed() const;
+  double held_error() const;
+  bool iterate();
   void accept();
+  Reaction reaction(std::size_t constraint) const;
   void close_seams();
   bool try_merge();
-  void relax();
+  bool relax();
+  void equilibria();
   void move_in_time();
   void log_row(const char* phase_name);
+  void record_row();
+  void set_time(double time);
   void check_end();
   GarmentMesh output() const;
 
@@ -116,14 +129,35 @@ class Run {
   Points3 velocity_;
   Points3 start_;         // of the current step: friction and inertia refer to it
   Points3 inertia_;       // where inertia alone would lead
+  Eigen::VectorXd inertia_rate_;  // energy of inertia is mass * rate / 2 |x - inertia|^2 [1/s2]
   Points3 link_start_, link_offset_;
-  double gravity_ = 0;
+  double gravity_part_ = 1;
+  Eigen::Vector3d gravity_ = Eigen::Vector3d::Zero();  // acts now [m/s2]
+  Points3 load_;          // force on each node now [N]
+  double time_ = 0;       // in the tables of paths and loads [s]
   double step_ = 0;       // [s]; infinite: no inertia
   bool damped_ = false;   // drag of the air counts
   std::vector<FrictionPair> friction_;
   std::vector<std::uint8_t> self_exempt_, support_exempt_;
-  std::vector<int> fixed_vertices_;  // of the garment
-  std::vector<char> fixed_;          // |nodes|
+  struct Held {
+    ConstraintSpec spec;
+    Selected selected;
+    Eigen::Vector3d centre = Eigen::Vector3d::Zero();      // of its particles at the start
+    Eigen::Matrix3d directions = Eigen::Matrix3d::Identity();  // projection on those that are held
+    std::vector<int> nodes;                                // that follow it, with the ghosts of its directors
+  };
+  std::vector<Held> held_;
+  struct Load {
+    LoadSpec spec;
+    Selected selected;
+  };
+  std::vector<Load> loads_;
+  std::vector<std::pair<std::string, Selected>> watched_;
+  std::vector<int> directed_vertices_;
+  std::vector<int> holder_;    // |nodes|: index into held_, or -1
+  std::vector<char> fixed_;    // |nodes|: all directions held
+  Points3 hold_start_;         // |nodes|: where held nodes were at the start
+  std::string record_;
 
   // of the last evaluation
   mechanics::SheetResponse response_;
@@ -136,12 +170,51 @@ class Run {
   SolveReport solve_report_;
   double momentum_ = momentum, tolerance_ = solver_tolerance, slack_ = energy_slack;  // sharper once the relaxation stalls
   double last_total_ = 1e300, last_left_ = 0, last_move_ = 0, last_fraction_ = 1, last_alpha_ = 1;
-  std::vector<Float4> rhs_, direction_;
+  std::vector<Float4> rhs_, direction_, given_, product_;
 };
+
+/// (matrix + terms) * x.
+void multiply(const BlockMatrix& matrix, const std::vector<ContactTerm>& terms, const std::vector<Float4>& x, std::vector<Float4>& y) {
+  y.resize(x.size());
+  parallel_for(x.size(), grain, [&](std::size_t i) {
+    Float4 sum{};
+    for (int k = matrix.row_start[i]; k < matrix.row_start[i + 1]; ++k) sum += matrix.value[static_cast<std::size_t>(k)] * x[static_cast<std::size_t>(matrix.column[static_cast<std::size_t>(k)])];
+    y[i] = sum;
+  });
+  for (const ContactTerm& term : terms) {
+    Float4 sum{};
+    for (std::size_t k = 0; k < 4; ++k) {
+      if (term.node[k] >= 0) sum += mechanics::splat(term.weight[k]) * x[static_cast<std::size_t>(term.node[k])];
+    }
+    const Float4 force = term.block * sum;
+    for (std::size_t k = 0; k < 4; ++k) {
+      if (term.node[k] >= 0) y[static_cast<std::size_t>(term.node[k])] += mechanics::splat(term.weight[k]) * force;
+    }
+  }
+}
+
+Eigen::Vector3d vector(const Float4& v) { return {static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])}; }
+
+/// Tangents of the cloth at a vertex: the mean of the faces of its panel around it, by area.
+mechanics::YarnGradient tangents(const GarmentMesh& garment, const Sheet& sheet, const Points3& x, const std::vector<std::vector<int>>& faces_of_vertex, int vertex) {
+  mechanics::YarnGradient sum{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+  double area = 0;
+  for (int f : faces_of_vertex[static_cast<std::size_t>(vertex)]) {
+    const mechanics::YarnGradient g = mechanics::yarn_gradient(sheet, x, static_cast<std::size_t>(f));
+    const double a = sheet.shapes[static_cast<std::size_t>(f)].area;
+    sum.weft += a * g.weft;
+    sum.warp += a * g.warp;
+    area += a;
+  }
+  TOILE_CHECK(area > 0, "vertex {} of {} is in no face", vertex, garment.vertex_count());
+  return {sum.weft / area, sum.warp / area};
+}
+
 
 Issues Run::build(const Ids& node_of_vertex) {
   mechanics::SheetOptions options;
   options.link_stiffness = params_.seam_stiffness;
+  options.directed_vertices = directed_vertices_;
   Result<Sheet> sheet = mechanics::make_sheet(garment_, node_of_vertex, options);
   if (!sheet) return sheet.issues();
   sheet_ = std::move(*sheet);
@@ -151,8 +224,21 @@ Issues Run::build(const Ids& node_of_vertex) {
   for (Eigen::Index f = 0; f < faces.rows(); ++f) {
     for (int k = 0; k < 3; ++k) faces(f, k) = sheet_.corners[static_cast<std::size_t>(f)][static_cast<std::size_t>(k)];
   }
+  if (sheet_.node_count > sheet_.cloth_nodes) {
+    std::vector<std::vector<int>> faces_of_vertex(static_cast<std::size_t>(garment_.vertex_count()));
+    for (Eigen::Index f = 0; f < faces.rows(); ++f) {
+      for (int k = 0; k < 3; ++k) faces_of_vertex[static_cast<std::size_t>(garment_.faces(f, k))].push_back(static_cast<int>(f));
+    }
+    x_.conservativeResize(sheet_.node_count, 3);
+    for (const mechanics::Director& d : sheet_.directors) {
+      const mechanics::YarnGradient t = tangents(garment_, sheet_, x_, faces_of_vertex, d.vertex);
+      x_.row(d.ghost_u) = x_.row(d.node) + d.length * t.weft.transpose();
+      x_.row(d.ghost_v) = x_.row(d.node) + d.length * t.warp.transpose();
+    }
+  }
   const Ids particle = mesh::particles(garment_);
   Ids adjacency(sheet_.node_count);
+  for (int i = sheet_.cloth_nodes; i < sheet_.node_count; ++i) adjacency[i] = static_cast<int>(garment_.vertex_count()) + i;
   for (Eigen::Index v = 0; v < node_of_vertex.size(); ++v) adjacency[node_of_vertex[v]] = particle[v];
   contact::Surface surface = contact::make_surface(sheet_.node_count, faces, adjacency);
   if (support_) {
@@ -171,37 +257,131 @@ Issues Run::build(const Ids& node_of_vertex) {
   }
   link_offset_ = link_start_;
   weight_ = sheet_.mass.sum() * params_.gravity;
-  fixed_.assign(static_cast<std::size_t>(sheet_.node_count), 0);
-  for (int v : fixed_vertices_) fixed_[static_cast<std::size_t>(node_of_vertex[v])] = 1;
+  inertia_rate_ = Eigen::VectorXd::Zero(sheet_.node_count);
+  hold_nodes();
+  set_time(time_);
   return {};
 }
 
-/// Vertices of the runs and points that `fixed` names.
-Issues Run::find_fixed() {
+/// Which nodes each constraint holds; a node that several name follows the first.
+void Run::hold_nodes() {
+  const auto n = static_cast<std::size_t>(sheet_.node_count);
+  holder_.assign(n, -1);
+  fixed_.assign(n, 0);
+  hold_start_ = x_;
+  std::vector<int> director(static_cast<std::size_t>(garment_.vertex_count()), -1);
+  for (std::size_t i = 0; i < sheet_.directors.size(); ++i) director[static_cast<std::size_t>(sheet_.directors[i].vertex)] = static_cast<int>(i);
+  for (std::size_t c = 0; c < held_.size(); ++c) {
+    Held& held = held_[c];
+    held.nodes.clear();
+    const bool whole = held.spec.kind != Hold::slide;
+    const auto take = [&](int node) {
+      if (holder_[static_cast<std::size_t>(node)] >= 0) return;
+      holder_[static_cast<std::size_t>(node)] = static_cast<int>(c);
+      fixed_[static_cast<std::size_t>(node)] = whole;
+      held.nodes.push_back(node);
+    };
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (int v : held.selected.vertices) {
+      const int node = sheet_.node_of_vertex[v];
+      sum += x_.row(node).transpose();
+      take(node);
+    }
+    held.centre = sum / static_cast<double>(held.selected.vertices.size());
+    if (held.spec.kind != Hold::clamp) continue;
+    for (int v : held.selected.vertices) {
+      const mechanics::Director& d = sheet_.directors[static_cast<std::size_t>(director[static_cast<std::size_t>(v)])];
+      take(d.ghost_u);
+      take(d.ghost_v);
+    }
+  }
+}
+
+/// Gravity and loads of a time.
+void Run::set_time(double time) {
+  time_ = time;
+  gravity_ = gravity_part_ * factor_at(params_.gravity_times, params_.gravity_factor, time) * params_.gravity * Eigen::Vector3d(params_.gravity_direction.data()).normalized();
+  load_ = Points3::Zero(sheet_.node_count, 3);
+  for (const Load& load : loads_) {
+    const Eigen::RowVector3d force = factor_at(load.spec.times, load.spec.factor, time) * Eigen::RowVector3d(load.spec.force.data());
+    for (std::size_t k = 0; k < load.selected.vertices.size(); ++k) load_.row(sheet_.node_of_vertex[load.selected.vertices[k]]) += load.selected.share[k] * force;
+  }
+}
+
+/// How far each held node has to go to where its path wants it now; zero for the others.
+std::vector<Float4> Run::prescribed() const {
+  std::vector<Float4> move(static_cast<std::size_t>(sheet_.node_count), Float4{});
+  for (const Held& held : held_) {
+    const Motion motion = motion_at(held.spec, held.centre, time_);
+    for (int node : held.nodes) {
+      const Eigen::Vector3d d = held.directions * (motion(hold_start_.row(node).transpose()) - x_.row(node).transpose());
+      move[static_cast<std::size_t>(node)] = mechanics::load3(d.data());
+    }
+  }
+  return move;
+}
+
+double Run::held_error() const {
+  double largest = 0;
+  for (const Held& held : held_) {
+    const Motion motion = motion_at(held.spec, held.centre, time_);
+    for (int node : held.nodes) largest = std::max(largest, (held.directions * (motion(hold_start_.row(node).transpose()) - x_.row(node).transpose())).norm());
+  }
+  return largest;
+}
+
+/// Vertices that constraints, loads and the record name.
+Issues Run::find_constraints() {
   Issues issues;
-  for (const std::string& name : params_.fixed) {
-    const std::size_t dot = name.find('.');
-    if (dot == std::string::npos) {
-      issues.push_back(Issue{"bad_reference", {.item = "fixed"}, fmt::format("'{}' is not panel.edge or panel.point", name), "write for example front.hem"});
+  std::vector<ConstraintSpec> specs;
+  if (!params_.fixed.empty()) {
+    ConstraintSpec fixed;
+    fixed.name = "fixed";
+    fixed.on = params_.fixed;
+    specs.push_back(fixed);
+  }
+  specs.insert(specs.end(), params_.constraints.begin(), params_.constraints.end());
+  std::set<std::string> names;
+  std::set<int> directed;
+  for (ConstraintSpec& spec : specs) {
+    if (spec.name.empty() && !spec.on.empty()) spec.name = spec.on.front();
+    if (!names.insert(spec.name).second) {
+      issues.push_back(Issue{"duplicate_name", {.item = "constraint " + spec.name}, "two constraints have this name", "give one of them another `name`"});
+    }
+    Result<Selected> selected = select(garment_, {spec.on, spec.from, spec.to, spec.region}, "constraint " + spec.name);
+    if (!selected) {
+      append(issues, selected.issues());
       continue;
     }
-    const Result<int> panel = mesh::find_panel(garment_, name.substr(0, dot));
-    if (!panel) {
-      append(issues, panel.issues());
-      continue;
+    Held held;
+    held.spec = spec;
+    held.selected = std::move(*selected);
+    if (spec.normal) {
+      const Eigen::Vector3d n = Eigen::Vector3d(spec.normal->data()).normalized();
+      held.directions = n * n.transpose();
+    } else if (spec.along) {
+      const Eigen::Vector3d t = Eigen::Vector3d(spec.along->data()).normalized();
+      held.directions = Eigen::Matrix3d::Identity() - t * t.transpose();
     }
-    const std::string item = name.substr(dot + 1);
-    const auto point = std::find_if(garment_.points.begin(), garment_.points.end(), [&](const mesh::NamedPoint& p) { return p.panel == *panel && p.name == item; });
-    if (point != garment_.points.end()) {
-      fixed_vertices_.push_back(point->vertex);
-      continue;
+    if (spec.kind == Hold::clamp) directed.insert(held.selected.vertices.begin(), held.selected.vertices.end());
+    held_.push_back(std::move(held));
+  }
+  directed_vertices_.assign(directed.begin(), directed.end());
+  for (const LoadSpec& spec : params_.loads) {
+    Result<Selected> selected = select(garment_, {spec.on, spec.from, spec.to, spec.region}, "load " + spec.name);
+    if (selected) {
+      loads_.push_back({spec, std::move(*selected)});
+    } else {
+      append(issues, selected.issues());
     }
-    const Result<int> run = mesh::find_run(garment_, *panel, item);
-    if (!run) {
-      append(issues, run.issues());
-      continue;
+  }
+  for (const std::string& name : params_.watch) {
+    Result<Selected> selected = select(garment_, {{name}, 0, 1, {}}, "watch " + name);
+    if (selected) {
+      watched_.emplace_back(name, std::move(*selected));
+    } else {
+      append(issues, selected.issues());
     }
-    for (int v : mesh::run_vertex_ids(garment_, *run)) fixed_vertices_.push_back(v);
   }
   return issues;
 }
@@ -238,9 +418,8 @@ void Run::clear_start() {
 void Run::evaluate(const Points3& x, bool with_matrix) {
   phase("sheet");
   mechanics::evaluate(sheet_, x, link_offset_, with_matrix ? std::optional(mechanics::Curvature::positive) : std::nullopt, response_);
-  gradient_ = response_.gradient;
-  gradient_.col(1) += gravity_ * sheet_.mass;
-  potential_ = gravity_ * sheet_.mass.dot(x.col(1));
+  gradient_ = response_.gradient - sheet_.mass * gravity_.transpose() - load_;
+  potential_ = -sheet_.mass.dot(x * gravity_) - load_.cwiseProduct(x).sum();
   phase("contact");
   contacts_ = search_->proximity(x, support_x_, {laws_.self.reach, laws_.support.reach});
   terms_.clear();
@@ -256,43 +435,109 @@ void Run::evaluate(const Points3& x, bool with_matrix) {
   phase("other");
 }
 
-double Run::static_residual() const {
-  double sum = 0;
-  for (Eigen::Index i = 0; i < gradient_.rows(); ++i) {
-    if (!fixed_[static_cast<std::size_t>(i)]) sum += gradient_.row(i).norm();
-  }
-  return sum / std::max(weight_, 1e-12);
+/// The net force on a node in the directions that are free.
+double Run::net_force(Eigen::Index node, const Eigen::RowVector3d& gradient) const {
+  const int holder = holder_[static_cast<std::size_t>(node)];
+  if (holder < 0) return gradient.norm();
+  if (fixed_[static_cast<std::size_t>(node)]) return 0;
+  return (gradient.transpose() - held_[static_cast<std::size_t>(holder)].directions * gradient.transpose()).norm();
 }
 
-/// One Newton iteration on energy + inertia from x_ with the evaluation of x_ at hand (with matrix). True when x_ moved.
-bool Run::iterate(double step) {
-  const double inverse_sq = std::isfinite(step) ? 1 / (step * step) : 0;
+/// What net forces are measured by: the weight or the loads, whichever is greater; without either, half of what constraints exert on
+/// the cloth (each pulls against another); a thousandth of the weight on earth where there is none of them.
+double Run::force_scale() const {
+  double loads = 0, reactions = 0;
+  for (Eigen::Index i = 0; i < load_.rows(); ++i) loads += load_.row(i).norm();
+  if (weight_ > 0 || loads > 0) return std::max(weight_, loads);
+  for (const Held& held : held_) {
+    for (int node : held.nodes) {
+      if (node < sheet_.cloth_nodes) reactions += (held.directions * gradient_.row(node).transpose()).norm();
+    }
+  }
+  return std::max(0.5 * reactions, 1e-3 * 9.81 * sheet_.mass.sum());
+}
+
+double Run::static_residual() const {
+  double sum = 0;
+  for (Eigen::Index i = 0; i < gradient_.rows(); ++i) sum += net_force(i, gradient_.row(i));
+  return sum / force_scale();
+}
+
+/// One Newton iteration on energy + inertia from x_ with the evaluation of x_ at hand (with matrix); held nodes go towards where their
+/// paths want them. True when x_ moved.
+bool Run::iterate() {
   const auto n = static_cast<std::size_t>(sheet_.node_count);
   rhs_.resize(n);
   const double drag = damped_ ? params_.air_drag / step_ : 0;
   parallel_for(n, grain, [&](std::size_t i) {
     const auto row = static_cast<Eigen::Index>(i);
-    const double m = sheet_.mass[row] * inverse_sq;
+    const double m = sheet_.mass[row] * inertia_rate_[row];
     const Eigen::Vector3d force = -(gradient_.row(row) + m * (x_.row(row) - inertia_.row(row))).transpose();
     rhs_[i] = mechanics::load3(force.data());
     Block& d = response_.matrix.value[static_cast<std::size_t>(sheet_.diagonal[i])];
     for (int c = 0; c < 3; ++c) d.column[c][c] += static_cast<float>(m + drag * sheet_.area[row]);
+  });
+  const std::vector<Float4> given = prescribed();
+  bool driven = false;
+  for (const Float4& d : given) driven = driven || d[0] != 0 || d[1] != 0 || d[2] != 0;
+  const std::vector<Float4> force = rhs_;
+  if (driven) {
+    multiply(response_.matrix, terms_, given, product_);
+    for (std::size_t i = 0; i < n; ++i) rhs_[i] -= product_[i];
+  }
+  BlockMatrix undriven;
+  if (driven) undriven = response_.matrix;
+  for (std::size_t i = 0; i < n; ++i) {
+    if (holder_[i] < 0) continue;
+    Block& d = response_.matrix.value[static_cast<std::size_t>(sheet_.diagonal[i])];
     if (fixed_[i]) {
       // A heavy diagonal holds the row; what is left of its motion is dropped below.
       rhs_[i] = Float4{};
       for (int c = 0; c < 3; ++c) d.column[c][c] += 1e8f;
+      continue;
     }
-  });
+    // The held directions are taken out of row and column.
+    const Eigen::Matrix3d held = held_[static_cast<std::size_t>(holder_[i])].directions, free = Eigen::Matrix3d::Identity() - held;
+    const Eigen::Vector3d r = free * vector(rhs_[i]);
+    rhs_[i] = mechanics::load3(r.data());
+    for (int k = response_.matrix.row_start[i]; k < response_.matrix.row_start[i + 1]; ++k) {
+      const auto j = static_cast<std::size_t>(response_.matrix.column[static_cast<std::size_t>(k)]);
+      Block& value = response_.matrix.value[static_cast<std::size_t>(k)];
+      if (j == i) {
+        const Eigen::Matrix3d m = value.matrix();
+        value = Block::from(free * m * free + m.trace() * held);
+        continue;
+      }
+      value = Block::from(free * value.matrix());
+      const auto begin = response_.matrix.column.begin() + response_.matrix.row_start[j], end = response_.matrix.column.begin() + response_.matrix.row_start[j + 1];
+      Block& mirrored = response_.matrix.value[static_cast<std::size_t>(std::lower_bound(begin, end, static_cast<int>(i)) - response_.matrix.column.begin())];
+      mirrored = Block::from(mirrored.matrix() * free);
+    }
+  }
   const auto inertia_energy = [&](const Points3& x) {
-    return 0.5 * inverse_sq * (x - inertia_).cwiseProduct(sheet_.mass.asDiagonal() * (x - inertia_)).sum();
+    return 0.5 * (x - inertia_).cwiseProduct(sheet_.mass.cwiseProduct(inertia_rate_).asDiagonal() * (x - inertia_)).sum();
   };
-  const double before = energy_ + inertia_energy(x_);
+  const double before = energy_ + inertia_energy(x_), scale_of_slack = force_scale();
   phase("solve");
   solver_.factor(response_.matrix, terms_, x_, fixed_);
   solve_report_ = solver_.solve(response_.matrix, terms_, rhs_, direction_, {.tolerance = tolerance_, .max_iterations = solver_iterations_max});
   report_.solver_iterations += solve_report_.iterations;
   ++report_.iterations;
   phase("limit");
+  for (std::size_t i = 0; i < n; ++i) {
+    if (holder_[i] < 0) continue;
+    const Eigen::Matrix3d& held = held_[static_cast<std::size_t>(holder_[i])].directions;
+    Eigen::Vector3d d = vector(given[i]);
+    if (!fixed_[i]) d += vector(direction_[i]) - held * vector(direction_[i]);
+    direction_[i] = mechanics::load3(d.data());
+  }
+  // Paths do work on the cloth: so much more energy, with room for what is not linear.
+  double work = 0;
+  if (driven) {
+    multiply(undriven, terms_, direction_, product_);
+    for (std::size_t i = 0; i < n; ++i) work += vector(direction_[i]).dot(0.5 * vector(product_[i]) - vector(force[i]));
+    work = 2 * std::max(work, 0.0);
+  }
   double largest = 0;
   for (const Float4& d : direction_) largest = std::max(largest, std::sqrt(static_cast<double>(d[0]) * d[0] + static_cast<double>(d[1]) * d[1] + static_cast<double>(d[2]) * d[2]));
   if (!std::isfinite(largest)) return false;
@@ -300,7 +545,14 @@ bool Run::iterate(double step) {
   Points3 target(x_.rows(), 3);
   for (std::size_t i = 0; i < n; ++i) {
     const auto row = static_cast<Eigen::Index>(i);
-    for (int c = 0; c < 3; ++c) target(row, c) = x_(row, c) + (fixed_[i] ? 0 : scale * static_cast<double>(direction_[i][c]));
+    for (int c = 0; c < 3; ++c) target(row, c) = x_(row, c) + scale * static_cast<double>(direction_[i][c]);
+  }
+  if (driven && scale == 1) {
+    // To the last digit.
+    for (const Held& held : held_) {
+      const Motion motion = motion_at(held.spec, held.centre, time_);
+      for (int node : held.nodes) target.row(node) += (held.directions * (motion(hold_start_.row(node).transpose()) - target.row(node).transpose())).transpose();
+    }
   }
   contact::LimitOptions options;
   options.self_exempt = self_exempt_;
@@ -317,15 +569,17 @@ bool Run::iterate(double step) {
     evaluate(candidate, true);
     const double after = energy_ + inertia_energy(candidate);
     const double part = std::min(1.0, alpha * scale * largest / slack_move);
-    if (after <= before + slack_ * part * part * part * part * weight_ || trial == 5) {
+    if (after <= before + slack_ * part * part * part * part * scale_of_slack + work || trial == 5) {
       x_ = candidate;
       moved = true;
       break;
     }
   }
   last_alpha_ = alpha;
-  const Points3 left = gradient_ + inverse_sq * (sheet_.mass.asDiagonal() * (x_ - inertia_));
-  last_left_ = left.rowwise().norm().sum() / std::max(weight_, 1e-12);
+  const Points3 left = gradient_ + sheet_.mass.cwiseProduct(inertia_rate_).asDiagonal() * (x_ - inertia_);
+  last_left_ = 0;
+  for (Eigen::Index i = 0; i < left.rows(); ++i) last_left_ += net_force(i, left.row(i));
+  last_left_ /= force_scale();
   last_move_ = (x_ - from).rowwise().norm().maxCoeff();
   return moved;
 }
@@ -345,11 +599,55 @@ void Run::accept() {
 
 void Run::log_row(const char* phase_name) {
   if (log_.empty()) {
-    log_ = "iteration,phase,step_s,residual,membrane_J,bending_J,potential_J,contact_J,links_J,contacts,least_gap_m,solver_iterations,solver_reduction,move_m,fraction,alpha\n";
+    log_ = "iteration,phase,time_s,step_s,residual,left,membrane_J,bending_J,potential_J,contact_J,links_J,kinetic_J,total_J,contacts,least_gap_m,solver_iterations,solver_reduction,move_m,fraction,alpha\n";
   }
-  log_ += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", report_.iterations, phase_name, step_, static_residual(), response_.energy.membrane,
-                      response_.energy.bending, potential_, contact_sums_.energy, response_.energy.links, contact_sums_.pairs, contact_sums_.least_gap,
-                      solve_report_.iterations, solve_report_.reduction, last_move_, last_fraction_, last_alpha_);
+  const double kinetic = damped_ || params_.mode == Mode::motion ? 0.5 * velocity_.cwiseProduct(sheet_.mass.asDiagonal() * velocity_).sum() : 0;
+  const double total = response_.energy.total() + potential_ + contact_sums_.energy + kinetic;
+  log_ += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", report_.iterations, phase_name, time_, step_, static_residual(), last_left_,
+                      response_.energy.membrane, response_.energy.bending, potential_, contact_sums_.energy, response_.energy.links, kinetic, total, contact_sums_.pairs,
+                      contact_sums_.least_gap, solve_report_.iterations, solve_report_.reduction, last_move_, last_fraction_, last_alpha_);
+}
+
+Reaction Run::reaction(std::size_t constraint) const {
+  const Held& held = held_[constraint];
+  Reaction r{held.spec.name};
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  for (int v : held.selected.vertices) centre += x_.row(sheet_.node_of_vertex[v]).transpose();
+  centre /= static_cast<double>(held.selected.vertices.size());
+  for (int node : held.nodes) {
+    const Eigen::Vector3d force = held.directions * gradient_.row(node).transpose();
+    r.force += force;
+    r.moment += (x_.row(node).transpose() - centre).cross(force);
+  }
+  return r;
+}
+
+/// One row of the record: the state at the end of an increment or time step, with the evaluation of x_ at hand.
+void Run::record_row() {
+  if (record_.empty()) {
+    record_ = "time_s,residual,membrane_J,bending_J,potential_J,contact_J";
+    for (const Held& held : held_) {
+      for (const char* what : {"move_x_m", "move_y_m", "move_z_m", "force_x_N", "force_y_N", "force_z_N", "moment_x_Nm", "moment_y_Nm", "moment_z_Nm"}) record_ += fmt::format(",{}.{}", held.spec.name, what);
+    }
+    for (const auto& [name, selected] : watched_) {
+      for (const char* axis : {"x", "y", "z"}) record_ += fmt::format(",{}.{}_m", name, axis);
+    }
+    record_ += "\n";
+  }
+  record_ += fmt::format("{},{},{},{},{},{}", time_, static_residual(), response_.energy.membrane, response_.energy.bending, potential_, contact_sums_.energy);
+  for (std::size_t c = 0; c < held_.size(); ++c) {
+    Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+    for (int v : held_[c].selected.vertices) centre += x_.row(sheet_.node_of_vertex[v]).transpose();
+    const Eigen::Vector3d move = centre / static_cast<double>(held_[c].selected.vertices.size()) - held_[c].centre;
+    const Reaction r = reaction(c);
+    for (const Eigen::Vector3d& v : {move, r.force, r.moment}) record_ += fmt::format(",{},{},{}", v.x(), v.y(), v.z());
+  }
+  for (const auto& [name, selected] : watched_) {
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    for (std::size_t k = 0; k < selected.vertices.size(); ++k) mean += selected.share[k] * x_.row(sheet_.node_of_vertex[selected.vertices[k]]).transpose();
+    record_ += fmt::format(",{},{},{}", mean.x(), mean.y(), mean.z());
+  }
+  record_ += "\n";
 }
 
 double widest_link(const Sheet& sheet, const Points3& x) {
@@ -364,7 +662,7 @@ bool Run::try_merge() {
   const Ids particle = mesh::particles(garment_);
   const Points3 vertices = scatter(x_, sheet_.node_of_vertex);
   const Points3 merged = gather_mean(vertices, particle, particle.maxCoeff() + 1);
-  Points3 target(sheet_.node_count, 3);
+  Points3 target = x_;
   for (Eigen::Index v = 0; v < particle.size(); ++v) target.row(sheet_.node_of_vertex[v]) = merged.row(particle[v]);
   contact::LimitOptions options;
   options.self_exempt = self_exempt_;
@@ -378,8 +676,10 @@ bool Run::try_merge() {
 
 void Run::close_seams() {
   if (sheet_.links.empty()) return;
-  gravity_ = params_.closing_gravity * params_.gravity;
+  gravity_part_ = params_.closing_gravity;
+  set_time(0);
   step_ = params_.time_step;
+  inertia_rate_.setConstant(1 / (step_ * step_));
   inertia_ = start_ = x_;
   const int limit = params_.closing_steps * 5;
   for (int i = 1; i <= limit && !interrupted(); ++i) {
@@ -388,7 +688,7 @@ void Run::close_seams() {
     // Sides that do not meet by now are pulled harder and harder.
     if (i > params_.closing_steps + 5) mechanics::scale_links(sheet_, 1.25);
     evaluate(x_, true);
-    iterate(step_);
+    iterate();
     log_row("closing");
     accept();
     const double widest = widest_link(sheet_, x_);
@@ -415,30 +715,37 @@ void Run::close_seams() {
   }
 }
 
-void Run::relax() {
-  gravity_ = params_.gravity;
+/// To equilibrium under the loads and paths of the present time. True when it was reached.
+bool Run::relax() {
   step_ = params_.time_step;
+  momentum_ = momentum;
+  tolerance_ = solver_tolerance;
+  slack_ = energy_slack;
+  last_total_ = 1e300;
   inertia_ = start_ = x_;
   link_offset_.setZero();
   evaluate(x_, true);
   double before = static_residual(), best = before;
   int stalled = 0;
+  // The state may be at rest already, after an increment without any change.
+  if (report_.iterations > 0 && before <= params_.residual && held_error() <= at_target) return true;
   for (int i = 0; i < params_.max_iterations && !interrupted(); ++i) {
-    iterate(step_);
+    inertia_rate_.setConstant(1 / (step_ * step_));
+    iterate();
     accept();
     // Friction's slip has been carried on; the force it gives is part of the balance from here on.
     evaluate(x_, true);
     const double residual = static_residual();
     log_row("relaxing");
-    if (hooks_.progress) hooks_.progress(std::clamp(0.2 + 0.8 * std::log(residual / 10) / std::log(params_.residual / 10), 0.2, 1.0), fmt::format("iteration {}, residual {:.2e}", report_.iterations, residual));
-    if (residual <= params_.residual) {
-      report_.converged = true;
-      break;
+    if (hooks_.progress && params_.increments == 1) {
+      hooks_.progress(std::clamp(0.2 + 0.8 * std::log(residual / 10) / std::log(params_.residual / 10), 0.2, 1.0), fmt::format("iteration {}, residual {:.2e}", report_.iterations, residual));
     }
+    const bool arrived = held_error() <= at_target;
+    if (residual <= params_.residual && arrived) return true;
     // How well one iteration solved its step: what is left of the step's own net force.
     const double left = last_left_ / before;
     before = residual;
-    if (residual < 0.95 * best) {
+    if (residual < 0.95 * best || !arrived) {
       best = residual;
       stalled = 0;
     } else {
@@ -459,11 +766,28 @@ void Run::relax() {
       step_ = std::min(1.4 * step_, step_max);
     }
   }
+  return false;
+}
+
+/// Equilibria at equal parts of the duration, one after the other.
+void Run::equilibria() {
+  gravity_part_ = 1;
+  report_.converged = true;
+  for (int k = 1; k <= params_.increments && !interrupted(); ++k) {
+    set_time(params_.duration * k / params_.increments);
+    if (!relax()) report_.converged = false;
+    record_row();
+    if (hooks_.progress && params_.increments > 1) {
+      hooks_.progress(static_cast<double>(k) / params_.increments, fmt::format("increment {} of {}, residual {:.2e}", k, params_.increments, static_residual()));
+    }
+    if (!report_.converged) break;
+  }
+  if (interrupted()) report_.converged = false;
   report_.residual = static_residual();
 }
 
 void Run::move_in_time() {
-  gravity_ = params_.gravity;
+  gravity_part_ = 1;
   link_offset_.setZero();
   step_ = params_.time_step;
   damped_ = params_.air_drag > 0;
@@ -476,23 +800,26 @@ void Run::move_in_time() {
       for (Eigen::Index i = 0; i < v.rows(); ++i) v(i, c) = values.integer ? values.integers[static_cast<std::size_t>(i)] : values.reals[static_cast<std::size_t>(i)];
       ++c;
     }
-    velocity_ = gather_mean(v, sheet_.node_of_vertex, sheet_.node_count);
+    velocity_.topRows(sheet_.cloth_nodes) = gather_mean(v, sheet_.node_of_vertex, sheet_.cloth_nodes);
   }
   const int steps = std::max(1, static_cast<int>(std::lround(params_.duration / params_.time_step)));
-  start_ = x_;
-  inertia_ = x_;
+  inertia_rate_.setConstant(1 / (step_ * step_));
   for (int i = 0; i < steps && !interrupted(); ++i) {
+    set_time((i + 1) * step_);
     start_ = x_;
     inertia_ = x_ + step_ * velocity_;
     evaluate(x_, true);
-    for (int k = 0; k < params_.newton_iterations; ++k) {
-      iterate(step_);
-      if (last_move_ < 1e-4) break;
+    bool done = false;
+    for (int k = 0; k < params_.newton_iterations && !done; ++k) {
+      iterate();
+      done = last_left_ <= params_.newton_residual && held_error() <= at_target;
     }
+    if (!done) ++report_.unconverged_steps;
     velocity_ = (x_ - start_) / step_;
     friction_ = update_friction(friction_, start_, contacts_, x_, support_x_, sheet_.area, laws_);
     report_.simulated_time = (i + 1) * step_;
     log_row("moving");
+    record_row();
     if (hooks_.progress) hooks_.progress(static_cast<double>(i + 1) / steps, fmt::format("t = {:.3f} s", report_.simulated_time));
   }
   start_ = x_;
@@ -563,7 +890,7 @@ Result<SimulationOutcome> Run::go() {
   }
   const Ids nodes = node_ids(garment_, closed);
   x_ = gather_mean(garment_.x, nodes, nodes.size() == 0 ? 0 : nodes.maxCoeff() + 1);
-  Issues issues = find_fixed();
+  Issues issues = find_constraints();
   append(issues, build(nodes));
   if (!issues.empty()) return issues;
 
@@ -579,7 +906,7 @@ Result<SimulationOutcome> Run::go() {
   close_seams();
   if (!interrupted()) {
     if (params_.mode == Mode::equilibrium) {
-      relax();
+      equilibria();
     } else {
       move_in_time();
     }
@@ -596,9 +923,8 @@ Result<SimulationOutcome> Run::go() {
   report_.contact_energy = contact_sums_.energy;
   report_.contacts = contact_sums_.pairs;
   report_.least_gap = contact_sums_.least_gap;
-  for (Eigen::Index i = 0; i < gradient_.rows(); ++i) {
-    if (!fixed_[static_cast<std::size_t>(i)]) report_.residual_max = std::max(report_.residual_max, gradient_.row(i).norm());
-  }
+  for (Eigen::Index i = 0; i < gradient_.rows(); ++i) report_.residual_max = std::max(report_.residual_max, net_force(i, gradient_.row(i)));
+  for (std::size_t c = 0; c < held_.size(); ++c) report_.reactions.push_back(reaction(c));
   check_end();
   if (interrupted()) {
     findings_.push_back(Issue{"interrupted", {}, "stopped before the end; the state so far is written", "run again", Category::interrupted});
@@ -606,7 +932,7 @@ Result<SimulationOutcome> Run::go() {
     findings_.push_back(Issue{"not_converged", {}, fmt::format("the residual is {:.2e} of the weight after {} iterations, {:.2e} was asked for", report_.residual, report_.iterations, params_.residual),
                               "raise max_iterations or residual", Category::not_converged});
   }
-  SimulationOutcome outcome{output(), report_, findings_, log_};
+  SimulationOutcome outcome{output(), report_, findings_, log_, record_};
   return outcome;
 }
 

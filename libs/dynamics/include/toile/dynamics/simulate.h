@@ -3,6 +3,7 @@
 
 #include "toile/base/fields.h"
 #include "toile/base/result.h"
+#include "toile/dynamics/constraints.h"
 #include "toile/mesh/garment_mesh.h"
 #include "toile/mesh/support_mesh.h"
 
@@ -17,11 +18,15 @@ enum class Mode { equilibrium, motion };
 struct SimulationParams {
   Mode mode = Mode::equilibrium;
   double gravity = 9.81;
+  std::array<double, 3> gravity_direction{0, -1, 0};
+  std::vector<double> gravity_times, gravity_factor;
   double residual = 1e-3;
   int max_iterations = 1200;
+  int increments = 1;
   double duration = 1.0;
   double time_step = 1.0 / 60;
   int newton_iterations = 4;
+  double newton_residual = 0.02;
   double air_drag = 0.05;
   double support_reach = 2e-3;
   std::optional<double> self_reach;
@@ -34,17 +39,27 @@ struct SimulationParams {
   double seam_gap = 5e-4;
   double largest_move = 0.02;
   std::vector<std::string> fixed;
+  std::vector<ConstraintSpec> constraints;
+  std::vector<LoadSpec> loads;
+  std::vector<std::string> watch;
+  std::string record;
   std::string log;
 
   static void describe(auto& f) {
     f(&SimulationParams::mode, {.key = "mode", .doc = "equilibrium: until the garment hangs at rest; motion: for `duration` from the given velocities"});
-    f(&SimulationParams::gravity, {.key = "gravity", .doc = "acceleration of gravity, downwards (-y)", .unit = "m/s2", .min = 0, .max = 100});
-    f(&SimulationParams::residual, {.key = "residual", .doc = "equilibrium: stop when the sum over all particles of the net force's length is this part of the garment's weight",
+    f(&SimulationParams::gravity, {.key = "gravity", .doc = "acceleration of gravity", .unit = "m/s2", .min = 0, .max = 100});
+    f(&SimulationParams::gravity_direction, {.key = "gravity_direction", .doc = "where gravity pulls to"});
+    f(&SimulationParams::gravity_times, {.key = "gravity_times", .doc = "times of the rows of `gravity_factor`, increasing", .unit = "s"});
+    f(&SimulationParams::gravity_factor, {.key = "gravity_factor", .doc = "part of gravity at each of these times, straight in between; not given: 1"});
+    f(&SimulationParams::residual, {.key = "residual", .doc = "equilibrium: stop when the sum over all particles of the net force's length is this part of the garment's weight (of the loads, if they are greater; of the reactions, if there is neither)",
                                     .unit = "1", .min = 1e-9, .max = 1});
-    f(&SimulationParams::max_iterations, {.key = "max_iterations", .doc = "equilibrium: Newton iterations after which the run ends unconverged (exit code 5)", .min = 1, .max = 1e6});
-    f(&SimulationParams::duration, {.key = "duration", .doc = "motion: simulated time", .unit = "s", .min = 0, .max = 1e4});
+    f(&SimulationParams::max_iterations, {.key = "max_iterations", .doc = "equilibrium: Newton iterations of an increment after which the run ends unconverged (exit code 5)", .min = 1, .max = 1e6});
+    f(&SimulationParams::increments, {.key = "increments", .doc = "equilibrium: so many in a row, at equal parts of `duration`, along the paths and loads", .min = 1, .max = 100000});
+    f(&SimulationParams::duration, {.key = "duration", .doc = "motion: simulated time; equilibrium: time of the last increment in the tables of paths and loads", .unit = "s", .min = 0, .max = 1e4});
     f(&SimulationParams::time_step, {.key = "time_step", .doc = "motion: step; equilibrium: the first step of the pseudo-time", .unit = "s", .min = 1e-6, .max = 1});
-    f(&SimulationParams::newton_iterations, {.key = "newton_iterations", .doc = "motion: Newton iterations a step at most", .min = 1, .max = 100});
+    f(&SimulationParams::newton_iterations, {.key = "newton_iterations", .doc = "motion: Newton iterations a step at most", .min = 1, .max = 1000});
+    f(&SimulationParams::newton_residual, {.key = "newton_residual", .doc = "motion: a step is done when the sum of what is left of its net forces is this part of the weight (or loads, or reactions), or after newton_iterations; the summary counts the steps that ended so",
+                                           .unit = "1", .min = 1e-9, .max = 1});
     f(&SimulationParams::air_drag, {.key = "air_drag", .doc = "motion: force per area and velocity that slows the cloth in still air", .unit = "N*s/m3", .min = 0, .max = 100});
     f(&SimulationParams::support_reach, {.key = "support_reach", .doc = "distance from the support at which it begins to carry the cloth's middle surface", .unit = "m", .min = 1e-4, .max = 0.05});
     f(&SimulationParams::self_reach, {.key = "self_reach", .doc = "distance between middle surfaces at which cloth begins to carry cloth; not given: the thickest fabric's thickness, at least 0.8 mm",
@@ -57,9 +72,30 @@ struct SimulationParams {
     f(&SimulationParams::seam_stiffness, {.key = "seam_stiffness", .doc = "pull on the two sides of a seam while it is open, per particle and distance", .unit = "N/m", .min = 1, .max = 1e6});
     f(&SimulationParams::seam_gap, {.key = "seam_gap", .doc = "distance at which the two sides of a seam become one", .unit = "m", .min = 1e-6, .max = 0.01});
     f(&SimulationParams::largest_move, {.key = "largest_move", .doc = "equilibrium: no particle moves farther in one iteration", .unit = "m", .min = 1e-4, .max = 1});
-    f(&SimulationParams::fixed, {.key = "fixed", .doc = "edges and points (panel.edge, panel.point) that are held where they are"});
-    f(&SimulationParams::log, {.key = "log", .doc = "CSV file with one row per iteration: energies, residual, contacts, strains; empty: none"});
+    f(&SimulationParams::fixed, {.key = "fixed", .doc = "edges and points (panel.edge, panel.point) that are held where they are; short for a constraint of kind pin"});
+    f(&SimulationParams::constraints, {.key = "constraints", .doc = "what is clamped, pinned, guided or driven; a particle named twice follows the first"});
+    f(&SimulationParams::loads, {.key = "loads", .doc = "forces on edges, points and regions"});
+    f(&SimulationParams::watch, {.key = "watch", .doc = "edges, points and panels whose mean position the record has"});
+    f(&SimulationParams::record, {.key = "record", .doc = "CSV file with one row per increment or time step: paths, reaction forces and moments, watched positions, energies; empty: none", .local = true});
+    f(&SimulationParams::log, {.key = "log", .doc = "CSV file with one row per iteration: energies, residual, contacts, strains; empty: none", .local = true});
+    f.check([](const SimulationParams& p, Issues& issues) {
+      const auto table = [&](const char* item, const std::vector<double>& times, const std::vector<double>& values) {
+        if (times.size() != values.size()) issues.push_back({"bad_table", {.item = item}, "there must be a factor for each time", "give as many as times"});
+        for (std::size_t i = 1; i < times.size(); ++i) {
+          if (!(times[i] > times[i - 1])) return issues.push_back({"bad_table", {.item = item}, "times must increase", "sort the rows"});
+        }
+      };
+      table("gravity_factor", p.gravity_times, p.gravity_factor);
+      if (!(p.gravity_direction[0] != 0 || p.gravity_direction[1] != 0 || p.gravity_direction[2] != 0)) issues.push_back({"bad_direction", {.item = "gravity_direction"}, "a direction has no length", "give another vector"});
+    });
   }
+};
+
+/// What a constraint does to the cloth at the end.
+struct Reaction {
+  std::string name;
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();   ///< that it exerts on the cloth [N]
+  Eigen::Vector3d moment = Eigen::Vector3d::Zero();  ///< about the mean of its particles [N m]
 };
 
 /// How the caller follows a run; any may be empty.
@@ -81,6 +117,8 @@ struct SimulationReport {
   double least_gap = 0;           ///< [m]
   double seam_gap_max = 0;        ///< before merging; 0 once all are closed [m]
   int seams_open = 0;             ///< particle pairs not closed
+  int unconverged_steps = 0;      ///< motion: time steps whose net forces were not brought down far enough
+  std::vector<Reaction> reactions;
   int start_inside = 0, start_intersections = 0;
   double start_move = 0;          ///< farthest that a particle was pushed out of the support at the start [m]
   int intersections = 0, support_intersections = 0, inside = 0;  ///< at the end, by the exact test
@@ -91,9 +129,10 @@ struct SimulationOutcome {
   SimulationReport report;
   Issues findings;   ///< not_converged, check, interrupted
   std::string log;   ///< CSV
+  std::string record;  ///< CSV
 };
 
-/// error  what make_sheet reports; "bad_support" when the support is not valid
+/// error  what make_sheet and select() report; "bad_support" when the support is not valid
 Result<SimulationOutcome> simulate(const mesh::GarmentMesh& garment, const std::optional<mesh::SupportMesh>& support, const SimulationParams& params, const SimulationHooks& hooks = {});
 
 }  // namespace toile::dynamics
