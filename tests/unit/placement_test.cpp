@@ -114,8 +114,8 @@ void cut_away(mesh::GarmentMesh& g, int panel, int columns, const Drop& drop) {
 }
 
 // A T-shirt of straight lines on a 20 mm grid: side seams, set-in sleeves, shoulders, a square neck.
-mesh::GarmentMesh boxy_tee() {
-  constexpr int nu = 28, nv = 33, inset = 3, depth = 11, shoulder = 5, neck = 3, sleeve_length = 8, cap = inset + depth;
+mesh::GarmentMesh boxy_tee(int sleeve_length = 8) {
+  constexpr int nu = 28, nv = 33, inset = 3, depth = 11, shoulder = 5, neck = 3, cap = inset + depth;
   mesh::GarmentMesh g;
   add_rectangle(g, "front", nu, nv, kCell);
   add_rectangle(g, "back", nu, nv, kCell);
@@ -492,6 +492,38 @@ TEST(place, mirrored_garment_on_a_mirrored_body_gives_the_mirrored_result_to_the
   EXPECT_EQ(a->report.rms_strain, b->report.rms_strain);
   EXPECT_EQ(a->garment.face_columns.at("warp_angle").reals[5], -b->garment.face_columns.at("warp_angle").reals[5]);
   EXPECT_NE(a->garment.face_columns.at("warp_angle").reals[5], 0);
+}
+
+TEST(place, long_sleeves_go_over_bent_elbows) {
+  // the forearms of the form turned forwards by 45 degrees
+  mesh::SupportMesh body = man();
+  for (const double side : {1.0, -1.0}) {
+    const auto& mark = body.landmarks.at(side > 0 ? "elbow_left" : "elbow_right");
+    const auto& shoulder = body.landmarks.at(side > 0 ? "shoulder_left" : "shoulder_right");
+    const Vector3d elbow(mark[0], mark[1], mark[2]), along = (elbow - Vector3d(shoulder[0], shoulder[1], shoulder[2])).normalized();
+    const Vector3d axis = along.cross(Vector3d::UnitZ()).normalized();
+    for (Eigen::Index v = 0; v < body.x.rows(); ++v) {
+      const Vector3d p = body.x.row(v);
+      const double s = (p - elbow).dot(along);
+      if (side * p.x() < 0.28 || s < -0.04) continue;
+      const double t = std::min((s + 0.04) / 0.08, 1.0), angle = std::numbers::pi / 4 * t * t * (3 - 2 * t);
+      body.x.row(v) = (elbow + Eigen::AngleAxisd(angle, axis) * (p - elbow)).transpose();
+    }
+  }
+  const auto frame = body_frame(body);
+  ASSERT_TRUE(frame.has_value());
+  ASSERT_TRUE(frame->arm_left && frame->arm_right);
+  auto g = boxy_tee(22);
+  for (Eigen::Index v = 0; v < g.vertex_count(); ++v) {  // half as wide at the wrist
+    if (g.vertex_panel[v] >= 2) g.uv(v, 0) = 0.28 + (0.5 + 0.5 * g.uv(v, 1) / 0.44) * (g.uv(v, 0) - 0.28);
+  }
+  const auto placed = place(g, body, {});
+  ASSERT_TRUE(placed.has_value()) << to_string(placed.issues().front());
+  for (const Issue& finding : placed->findings) ADD_FAILURE() << to_string(finding);
+  // a straight sleeve of paper closes on a bent arm no farther than this
+  EXPECT_LT(placed->report.mean_seam_gap, 0.03);
+  EXPECT_LT(seam_mean(placed->report, g, "underarm_left"), 0.04);
+  EXPECT_LT(seam_mean(placed->report, g, "armhole_right"), 0.03);
 }
 
 TEST(place, refuses_free_layers) {

@@ -88,6 +88,78 @@ double width_at(const mesh::GarmentMesh& garment, const Layout& layout, const st
   return sum;
 }
 
+// The axis of a sleeve: the straight line next to the trunk, from there the smoothed middles of the arm, with a frame carried
+// along without twist.
+class ArmAxis {
+ public:
+  // top  square to the line [unit], where a sleeve's u is 0
+  ArmAxis(const Limb& limb, const Vector3d& top) : origin_(limb.origin), direction_(limb.direction), top_(top) {
+    std::vector<Vector3d> middles;
+    std::vector<double> at;
+    for (const LimbPoint& point : limb.points) {
+      at.push_back(middles.empty() ? (point.centre - origin_).dot(direction_) : at.back() + (point.centre - middles.back()).norm());
+      middles.push_back(point.centre);
+    }
+    if (middles.size() <= kStraightPoints) return;
+    const auto raw = [&](double s) -> Vector3d {
+      if (s <= at[kStraightPoints]) return origin_ + s * direction_;
+      if (s >= at.back()) return middles.back() + (s - at.back()) * (middles.back() - middles[middles.size() - 4]).normalized();
+      const auto i = static_cast<std::size_t>(std::upper_bound(at.begin(), at.end(), s) - at.begin());
+      return middles[i - 1] + (s - at[i - 1]) / (at[i] - at[i - 1]) * (middles[i] - middles[i - 1]);
+    };
+    for (double s = kFrom; s < at.back() + 0.3; s += kStep) {
+      Vector3d sum = Vector3d::Zero();
+      double total = 0;
+      for (double d = -kSmooth; d <= kSmooth; d += kStep) {
+        const double weight = 1 - std::abs(d) / (kSmooth + kStep);
+        sum += weight * raw(s + d);
+        total += weight;
+      }
+      points_.push_back(sum / total);
+    }
+    // So far from the line that a straight tube would press on the arm.
+    for (const Vector3d& p : points_) {
+      const Vector3d d = p - origin_;
+      bent_ = bent_ || (d - d.dot(direction_) * direction_).norm() > kBent;
+    }
+    if (!bent_) return;
+    length_.push_back(kFrom);
+    Vector3d tangent = direction_, across = top_;
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+      if (i > 0) length_.push_back(length_.back() + (points_[i] - points_[i - 1]).norm());
+      const Vector3d next = (points_[std::min(i + 1, points_.size() - 1)] - points_[i > 0 ? i - 1 : 0]).normalized();
+      across = Eigen::Quaterniond::FromTwoVectors(tangent, next) * across;
+      across = (across - across.dot(next) * next).normalized();
+      tangent = next;
+      tops_.push_back(across);
+      tangents_.push_back(tangent);
+    }
+  }
+  bool bent() const { return bent_; }
+  // Point of a tube round the axis: s outwards along it, the angle from `top`.
+  Vector3d tube(double s, double angle, double radius) const {
+    Vector3d at = origin_ + s * direction_, top = top_, out = direction_;
+    if (bent_ && s > length_.front()) {
+      const auto i = std::clamp<std::size_t>(static_cast<std::size_t>(std::upper_bound(length_.begin(), length_.end(), s) - length_.begin()), 1, length_.size() - 1);
+      const double t = (s - length_[i - 1]) / (length_[i] - length_[i - 1]);
+      at = points_[i - 1] + t * (points_[i] - points_[i - 1]);
+      const double part = std::clamp(t, 0.0, 1.0);
+      out = ((1 - part) * tangents_[i - 1] + part * tangents_[i]).normalized();
+      top = (1 - part) * tops_[i - 1] + part * tops_[i];
+      top = (top - top.dot(out) * out).normalized();
+    }
+    return at + radius * (std::cos(angle) * top + std::sin(angle) * (-out).cross(top));
+  }
+
+ private:
+  static constexpr std::size_t kStraightPoints = 10;  // middles next to the trunk that count as on the line
+  static constexpr double kFrom = -0.4, kStep = 0.01, kSmooth = 0.08, kBent = 0.015;
+  Vector3d origin_, direction_, top_;
+  bool bent_ = false;
+  std::vector<Vector3d> points_, tops_, tangents_;
+  std::vector<double> length_;
+};
+
 // Whether the cloth goes all the way round at the level h: its cut ends lie at seams, or at edges that fasteners close there.
 bool goes_round(const mesh::GarmentMesh& garment, const Layout& layout, const std::vector<Vector2d>& flat, const std::vector<mesh::Edge>& borders, const std::vector<char>& welded, Part part, double h) {
   for (const mesh::Edge& edge : borders) {
@@ -347,9 +419,10 @@ Result<Start> bend(const mesh::GarmentMesh& garment, const FoldedFlat& folded, c
       }
       if (narrow) issues.push_back(*narrow);
     }
+    const ArmAxis axis(*limb, top);
     const auto tube = [&](const Vector2d& p, double along, double level) {
       const double angle = turn + p.x() / radius;
-      return Vector3d(origin + (radius + kSheet * level) * (std::cos(angle) * top + std::sin(angle) * across) + (p.y() + along) * up);
+      return axis.tube(-(p.y() + along), angle, radius + kSheet * level);
     };
     // Outwards until no vertex of a trunk panel lies in the tube's wall (within a margin).
     const double margin = kSleeveGap + 0.012;
@@ -494,7 +567,7 @@ Result<Placed> place_as_given(const mesh::GarmentMesh& sewn, const mesh::Support
     if (!contact::self_intersections(cloth, x).empty()) x = contact::untangle(cloth, x).x;
   }
   placed.garment.x = x;
-  placed.report = measure(placed.garment, support, wanted_directions(garment, folded_flat, layout, frame, start.x));
+  placed.report = measure(placed.garment, support, wanted_directions(garment, folded_flat, layout, start.x));
   add_columns(placed.garment, placed.report);
   const Report& report = placed.report;
   const auto finding = [&](const char* code, const std::string& what, const std::string& remedy) {

@@ -36,7 +36,7 @@ Directions directions(const mesh::GarmentMesh& garment, const Points3& x, Eigen:
 
 }  // namespace
 
-std::vector<std::optional<WantedDirection>> wanted_directions(const mesh::GarmentMesh& garment, const FoldedFlat& folded, const Layout& layout, const BodyFrame& frame, const Points3& bent) {
+std::vector<std::optional<WantedDirection>> wanted_directions(const mesh::GarmentMesh& garment, const FoldedFlat& folded, const Layout& layout, const Points3& bent) {
   std::vector<std::optional<WantedDirection>> wanted(static_cast<std::size_t>(garment.face_count()));
   for (std::size_t f = 0; f < wanted.size(); ++f) {
     const auto row = static_cast<Eigen::Index>(f);
@@ -48,7 +48,8 @@ std::vector<std::optional<WantedDirection>> wanted_directions(const mesh::Garmen
     const Directions start = directions(garment, bent, row);
     if (!start.known) continue;
     WantedDirection& w = wanted[f].emplace();
-    w.up = panel.part == Part::trunk ? Vector3d::UnitY() : panel.part == Part::arm_left ? Vector3d(-frame.arm_left->direction) : Vector3d(-frame.arm_right->direction);
+    // An arm may be bent: along it where the panel was bent round it.
+    w.up = panel.part == Part::trunk ? Vector3d::UnitY() : (std::sin(panel.turn) * start.weft + std::cos(panel.turn) * start.warp).normalized();
     w.around = (std::cos(panel.turn) * start.weft - std::sin(panel.turn) * start.warp).normalized();
     w.turn = panel.turn;
   }

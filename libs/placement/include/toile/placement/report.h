@@ -54,7 +54,7 @@ struct WantedDirection {
 /// As the layout turned the panels. Faces of parts that are folded over and of attached panels have none.
 /// bent  the panels bent round their parts [m], |V| x 3
 /// ret   |F|
-std::vector<std::optional<WantedDirection>> wanted_directions(const mesh::GarmentMesh& garment, const FoldedFlat& folded, const Layout& layout, const BodyFrame& frame, const Points3& bent);
+std::vector<std::optional<WantedDirection>> wanted_directions(const mesh::GarmentMesh& garment, const FoldedFlat& folded, const Layout& layout, const Points3& bent);
 
 /// wanted  |F|, or empty: no directions are measured.
 Report measure(const mesh::GarmentMesh& garment, const mesh::SupportMesh& support, const std::vector<std::optional<WantedDirection>>& wanted = {});
