@@ -1,5 +1,6 @@
 // Puts a sewn flat garment on a support.
 #include "toile/placement/place.h"
+#include "toile/reshape/flatten.h"
 #include "toile/stage/stage.h"
 
 #include <numbers>
@@ -23,16 +24,27 @@ struct PlaceStage {
                        "the body, flattened at first, swells between them. The seams that stay open close in the simulation; the summary lists "
                        "them, with the largest edge strain, the angle of the warp from its wanted direction, the smallest gap to the body and any intersections; "
                        "the file has them as columns (edge_strain, ease, seam_gap of vertices; warp_angle, cuts of faces). The body needs no landmarks: "
-                       "waist, hips, armpits, shoulders and arms are found from its sections. docs/placement.md says how.",
+                       "waist, hips, armpits, shoulders and arms are found from its sections. With `start` panels begin where the panels of the same names in that file are, through "
+                       "their panel coordinates, and are relaxed from there. docs/placement.md says how.",
             .inputs = {{.name = "garment", .doc = "sewn garment (flat panels)", .kind = stage::FileKind::garment},
-                       {.name = "support", .doc = "body or dress form: closed, upright, facing +z, arms held away", .kind = stage::FileKind::support}},
+                       {.name = "support", .doc = "body or dress form: closed, upright, facing +z, arms held away", .kind = stage::FileKind::support},
+                       {.name = "start", .doc = "garment with panels of the same names and where they begin, such as the map of toile-flatten", .kind = stage::FileKind::garment, .required = false}},
             .output = stage::FileKind::garment};
   }
 
   static Result<stage::Output> run(const Params& params, stage::Run& run) {
     TOILE_TRY(const mesh::GarmentMesh garment, run.garment("garment"));
     TOILE_TRY(const mesh::SupportMesh support, run.support("support"));
-    TOILE_TRY(placement::Placed placed, placement::place(garment, support, params, [&](double f) { run.progress(f, "placing"); }));
+    const auto progress = [&](double f) { run.progress(f, "placing"); };
+    TOILE_TRY(placement::Placed placed, [&]() -> Result<placement::Placed> {
+      if (!run.has("start")) return placement::place(garment, support, params, progress);
+      TOILE_TRY(const mesh::GarmentMesh map, run.garment("start"));
+      auto start = reshape::positions_from(map, garment);
+      if (start) return placement::place_from(garment, *start, support, params, progress);
+      Issues issues = start.issues();
+      for (Issue& issue : issues) issue.place.file = run.path("start");
+      return issues;
+    }());
     for (const Issue& warning : placed.warnings) run.warn(warning);
     const placement::Report& report = placed.report;
     run.report("max_edge_strain", report.max_strain);

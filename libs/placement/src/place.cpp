@@ -452,6 +452,43 @@ Result<Start> bend(const mesh::GarmentMesh& garment, const FoldedFlat& folded, c
 
 namespace {
 
+/// Figures, columns and findings of what the relaxation came to.
+void conclude(Placed& placed, const mesh::SupportMesh& support, const PlaceParams& params, const std::vector<std::optional<WantedDirection>>& wanted) {
+  placed.report = measure(placed.garment, support, wanted);
+  add_columns(placed.garment, placed.report);
+  const Report& report = placed.report;
+  const mesh::GarmentMesh& sewn = placed.garment;
+  const auto finding = [&](const char* code, const std::string& what, const std::string& remedy) {
+    placed.findings.push_back({.code = code, .place = {.item = "garment"}, .what = what, .remedy = remedy, .category = Category::check});
+  };
+  if (report.max_strain > params.max_strain) {
+    finding("strain", fmt::format("largest edge strain {:.4f} is over {:.4f}", report.max_strain, params.max_strain), "give more settling_steps, a smaller offset, or a larger size");
+  }
+  if (report.rms_strain > params.rms_strain) {
+    finding("strain", fmt::format("root mean square edge strain {:.5f} is over {:.5f}", report.rms_strain, params.rms_strain), "give more settling_steps, a smaller offset, or a larger size");
+  }
+  const auto between = [&](const std::vector<contact::FacePair>& pairs, bool with_support) {
+    std::map<std::pair<std::string, std::string>, int> count;
+    const auto name = [&](int face) { return sewn.panels[static_cast<std::size_t>(sewn.face_panel[face])].name; };
+    for (const auto& pair : pairs) {
+      const std::string a = name(pair.a), b = with_support ? std::string() : name(pair.b);
+      ++count[with_support || a < b ? std::pair(a, b) : std::pair(b, a)];
+    }
+    std::string text;
+    for (const auto& [names, n] : count) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", names.second.empty() || names.first == names.second ? names.first : names.first + "/" + names.second, n);
+    return text;
+  };
+  if (report.vertices_inside > 0 || !report.support_intersections.empty()) {
+    finding("inside_support", fmt::format("{} vertices are inside the support, {} pairs of triangles cut{}", report.vertices_inside, report.support_intersections.size(),
+                                          report.support_intersections.empty() ? "" : " (" + between(report.support_intersections, true) + ")"),
+            "give a larger offset or a finer mesh; the simulation pushes the cloth out first");
+  }
+  if (!report.self_intersections.empty()) {
+    finding("self_intersection", fmt::format("{} pairs of cloth triangles cut one another ({})", report.self_intersections.size(), between(report.self_intersections, false)),
+            "give more steps, or move panels apart (shift); the simulation takes crossings of a few triangles apart");
+  }
+}
+
 Result<Placed> place_as_given(const mesh::GarmentMesh& sewn, const mesh::SupportMesh& support, const PlaceParams& params, const std::function<void(double)>& progress) {
   if (!sewn.free_layers.empty()) {
     Issues issues;
@@ -567,38 +604,7 @@ Result<Placed> place_as_given(const mesh::GarmentMesh& sewn, const mesh::Support
     if (!contact::self_intersections(cloth, x).empty()) x = contact::untangle(cloth, x).x;
   }
   placed.garment.x = x;
-  placed.report = measure(placed.garment, support, wanted_directions(garment, folded_flat, layout, start.x));
-  add_columns(placed.garment, placed.report);
-  const Report& report = placed.report;
-  const auto finding = [&](const char* code, const std::string& what, const std::string& remedy) {
-    placed.findings.push_back({.code = code, .place = {.item = "garment"}, .what = what, .remedy = remedy, .category = Category::check});
-  };
-  if (report.max_strain > params.max_strain) {
-    finding("strain", fmt::format("largest edge strain {:.4f} is over {:.4f}", report.max_strain, params.max_strain), "give more settling_steps, a smaller offset, or a larger size");
-  }
-  if (report.rms_strain > params.rms_strain) {
-    finding("strain", fmt::format("root mean square edge strain {:.5f} is over {:.5f}", report.rms_strain, params.rms_strain), "give more settling_steps, a smaller offset, or a larger size");
-  }
-  const auto between = [&](const std::vector<contact::FacePair>& pairs, bool with_support) {
-    std::map<std::pair<std::string, std::string>, int> count;
-    const auto name = [&](int face) { return sewn.panels[static_cast<std::size_t>(sewn.face_panel[face])].name; };
-    for (const auto& pair : pairs) {
-      const std::string a = name(pair.a), b = with_support ? std::string() : name(pair.b);
-      ++count[with_support || a < b ? std::pair(a, b) : std::pair(b, a)];
-    }
-    std::string text;
-    for (const auto& [names, n] : count) text += fmt::format("{}{} {}", text.empty() ? "" : ", ", names.second.empty() || names.first == names.second ? names.first : names.first + "/" + names.second, n);
-    return text;
-  };
-  if (report.vertices_inside > 0 || !report.support_intersections.empty()) {
-    finding("inside_support", fmt::format("{} vertices are inside the support, {} pairs of triangles cut{}", report.vertices_inside, report.support_intersections.size(),
-                                          report.support_intersections.empty() ? "" : " (" + between(report.support_intersections, true) + ")"),
-            "give a larger offset or a finer mesh; the simulation pushes the cloth out first");
-  }
-  if (!report.self_intersections.empty()) {
-    finding("self_intersection", fmt::format("{} pairs of cloth triangles cut one another ({})", report.self_intersections.size(), between(report.self_intersections, false)),
-            "give more steps, or move panels apart (shift); the simulation takes crossings of a few triangles apart");
-  }
+  conclude(placed, support, params, wanted_directions(garment, folded_flat, layout, start.x));
   return placed;
 }
 
@@ -614,6 +620,57 @@ Result<Placed> place(const mesh::GarmentMesh& sewn, const mesh::SupportMesh& sup
   placed.garment.x = x;
   for (double& angle : placed.report.face_warp_angle) angle = -angle;
   add_columns(placed.garment, placed.report);
+  return placed;
+}
+
+namespace {
+
+/// What lies in the support, or nearer to it than `offset`, is lifted off it along the support's smooth normals.
+Points3 lifted(const Points3& x, const mesh::SupportMesh& support, double offset) {
+  Points3 normals = Points3::Zero(support.x.rows(), 3);
+  for (Eigen::Index f = 0; f < support.faces.rows(); ++f) {
+    const Vector3d a = support.x.row(support.faces(f, 0)), b = support.x.row(support.faces(f, 1)), c = support.x.row(support.faces(f, 2));
+    for (int k = 0; k < 3; ++k) normals.row(support.faces(f, k)) += (b - a).cross(c - a).transpose();
+  }
+  normals.rowwise().normalize();
+  const contact::Surface body = contact::make_surface(static_cast<int>(support.x.rows()), support.faces);
+  const contact::SupportField field(body, support.x);
+  std::vector<contact::SurfacePoint> near;
+  std::vector<int> warm;
+  field.nearest(x, 2 * offset, near, warm);
+  Points3 result = x;
+  for (Eigen::Index v = 0; v < x.rows(); ++v) {
+    const contact::SurfacePoint& p = near[static_cast<std::size_t>(v)];
+    if (p.face < 0 || p.distance >= offset) continue;
+    Vector3d normal = Vector3d::Zero();
+    for (int k = 0; k < 3; ++k) normal += p.weight[static_cast<std::size_t>(k)] * normals.row(support.faces(p.face, k)).transpose();
+    result.row(v) = (p.point + offset * normal.normalized()).transpose();
+  }
+  return result;
+}
+
+}  // namespace
+
+Placed place_from(const mesh::GarmentMesh& sewn, const Points3& start, const mesh::SupportMesh& support, const PlaceParams& params, const std::function<void(double)>& progress) {
+  RelaxOptions options;
+  options.offset = params.offset;
+  options.clearance = params.clearance;
+  options.thickness = params.thickness;
+  options.closing_steps = 0;
+  options.swelling_steps = 0;
+  options.settling_steps = params.fine_steps;
+  options.polishing_steps = params.polishing_steps;
+  options.max_strain = kPolish * params.max_strain;
+  options.rms_strain = kPolish * params.rms_strain;
+  options.seam = params.seam;
+  options.bending = params.bending;
+  const Points3 x = lifted(start, support, params.offset);
+  options.rolled = x;
+  options.progress = progress;
+  Placed placed;
+  placed.garment = sewn;
+  placed.garment.x = relax(sewn, x, support, options);
+  conclude(placed, support, params, {});
   return placed;
 }
 

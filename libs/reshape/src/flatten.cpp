@@ -599,7 +599,7 @@ Result<Flattened> flatten_cut(const Surface& surface, Cutting cutting, const std
           const std::string name = fmt::format("{}_n{}", seam.name, k);
           seam.notches.push_back(name);
           notches[p][s].emplace_back(name, row_length(pieces[p].uv, stretch.row, i) / seam.length_a);
-          notches[found->second.piece][found->second.stretch].emplace_back(name, row_length(other.uv, mate.row, last - i) / seam.length_b);
+          notches[found->second.piece][found->second.stretch].emplace_back(found->second.piece == p ? name + "_b" : name, row_length(other.uv, mate.row, last - i) / seam.length_b);
         }
       }
       mates.push_back({{p, s}, found->second, result.seams.size()});
@@ -633,8 +633,12 @@ Result<Flattened> flatten_cut(const Surface& surface, Cutting cutting, const std
       std::vector<Vector2d> row;
       for (const int v : stretch.row) row.push_back(mm(piece.uv.row(v)));
       pattern::Edge edge{stretch.name, corner.at(stretch.row.front()), corner.at(stretch.row.back()), fit_curves(row, 1e3 * params.fit), {}};
+      for (pattern::Segment& segment : edge.segments) {
+        segment.control_1 = mm(1e-3 * segment.control_1.transpose());
+        segment.control_2 = mm(1e-3 * segment.control_2.transpose());
+      }
       drawn.outline.push_back(std::move(edge));
-      for (const auto& [name, fraction] : notches[p][s]) drawn.notches.push_back({name, stretch.name, {}, {}, fraction});
+      for (const auto& [name, fraction] : notches[p][s]) drawn.notches.push_back({name, stretch.name, {}, {}, std::round(1e6 * fraction) / 1e6});
     }
     const Eigen::RowVector2d high = piece.uv.colwise().maxCoeff();
     drawn.grain = pattern::Grain{mm(Eigen::RowVector2d(0.5 * high.x(), 0.25 * high.y())), mm(Eigen::RowVector2d(0.5 * high.x(), 0.75 * high.y()))};
@@ -760,7 +764,7 @@ std::string seam_spec(const std::vector<SeamRow>& seams) {
     if (!seam.notches.empty()) {
       text += ", match: [";
       for (std::size_t i = 0; i < seam.notches.size(); ++i) {
-        text += fmt::format("{}{{a: {}.{}, b: {}.{}}}", i ? ", " : "", seam.a_piece, seam.notches[i], seam.b_piece, seam.notches[i]);
+        text += fmt::format("{}{{a: {}.{}, b: {}.{}{}}}", i ? ", " : "", seam.a_piece, seam.notches[i], seam.b_piece, seam.notches[i], seam.a_piece == seam.b_piece ? "_b" : "");
       }
       text += "]";
     }

@@ -27,6 +27,11 @@ struct Placed {
 Result<Placed> place(const mesh::GarmentMesh& garment, const mesh::SupportMesh& support, const PlaceParams& params,
                      const std::function<void(double)>& progress = {});
 
+/// The relaxation alone, from given positions near the support: seams close and let go (`fine_steps`), stretch is taken out.
+/// start  [m], |V| x 3
+Placed place_from(const mesh::GarmentMesh& garment, const Points3& start, const mesh::SupportMesh& support, const PlaceParams& params,
+                  const std::function<void(double)>& progress = {});
+
 /// Panels bent around the flattened support, before the relaxation. The flattening is chosen where params leave it open.
 struct Start {
   Points3 x;

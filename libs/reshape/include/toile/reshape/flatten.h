@@ -138,7 +138,7 @@ struct SeamRow {
   std::string name, kind = "plain";
   std::string a_piece, a_edge, b_piece, b_edge;
   double length_a = 0, length_b = 0;  ///< in the plane [m]
-  std::vector<std::string> notches;   ///< of both edges, by the same name
+  std::vector<std::string> notches;   ///< of both edges, by the same name; within one piece the second has the suffix _b
 };
 
 struct Flattened {
