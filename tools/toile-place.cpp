@@ -16,7 +16,7 @@ struct PlaceStage {
 
   static stage::Description description() {
     return {.name = "toile-place",
-            .version = 6,
+            .version = 7,
             .summary = "Bends sewn flat panels around a body without stretching them and draws their seams together.",
             .example = "toile-place layered.ply form.ply -o placed.ply",
             .details = "Each panel goes on the trunk or on an arm, as its name and its seams say (front, back, waistband, sleeve), or as `panels` "

@@ -526,6 +526,54 @@ TEST(place, long_sleeves_go_over_bent_elbows) {
   EXPECT_LT(seam_mean(placed->report, g, "armhole_right"), 0.03);
 }
 
+TEST(place, panels_on_true_cones_and_cylinders_keep_all_lengths_on_the_surface) {
+  for (const double slope : {-0.3, 0.2, 0.0}) {
+    SCOPED_TRACE(slope);
+    constexpr int around = 90, rows = 8;
+    const double low = 0.18 + std::max(0.0, -slope) * 0.1;
+    mesh::SupportMesh support;
+    support.x.resize(around * (rows + 1) + 2, 3);
+    std::vector<std::array<int, 3>> faces;
+    for (int j = 0; j <= rows; ++j) {
+      const double y = 0.05 * j, r = low + slope * y;
+      for (int i = 0; i < around; ++i) {
+        const double angle = 2 * std::numbers::pi * i / around;
+        support.x.row(j * around + i) << r * std::sin(angle), y, r * std::cos(angle);
+        const int a = j * around + i, b = j * around + (i + 1) % around;
+        if (j < rows) faces.insert(faces.end(), {{a, b, b + around}, {a, b + around, a + around}});
+        if (j == 0) faces.push_back({around * (rows + 1), b, a});
+        if (j == rows) faces.push_back({around * (rows + 1) + 1, a, b});
+      }
+    }
+    support.x.row(around * (rows + 1)) << 0, 0, 0;
+    support.x.row(around * (rows + 1) + 1) << 0, 0.05 * rows, 0;
+    support.faces.resize(static_cast<Eigen::Index>(faces.size()), 3);
+    for (std::size_t f = 0; f < faces.size(); ++f) support.faces.row(static_cast<Eigen::Index>(f)) << faces[f][0], faces[f][1], faces[f][2];
+    support.face_region = mesh::Ids::Constant(support.faces.rows(), -1);
+    mesh::GarmentMesh g;
+    add_rectangle(g, "square", 10, 10, 0.016);
+    PlaceParams params;
+    params.offset = 0.002;
+    params.panels["square"] = {.region = Region::torso, .point = "top", .to = {0, 0.3, low + slope * 0.3}, .turn = 0.3};
+    const auto placed = place(g, support, params);
+    ASSERT_TRUE(placed.has_value()) << to_string(placed.issues().front());
+    EXPECT_TRUE(placed->findings.empty());
+    const auto unrolled = [&](Eigen::Index v) -> Vector2d {
+      const Vector3d p = placed->garment.x.row(v);
+      const double r = std::hypot(p.x(), p.z()), angle = std::atan2(p.x(), p.z());
+      if (slope == 0) return {r * angle, p.y()};
+      const double sine = std::abs(slope) / std::sqrt(1 + slope * slope);
+      return r / sine * Vector2d(std::cos(angle * sine), std::sin(angle * sine));
+    };
+    for (const mesh::Edge& edge : mesh::edges(g.faces)) {
+      const double length = (g.uv.row(edge.a) - g.uv.row(edge.b)).norm();
+      ASSERT_NEAR((unrolled(edge.a) - unrolled(edge.b)).norm() / length, 1, 1e-6);
+    }
+    EXPECT_NEAR(placed->report.smallest_gap, 0.002, 2e-4);
+    EXPECT_LE(placed->report.max_strain, std::pow(0.016 * std::sqrt(2) / 0.09, 2) / 24);
+  }
+}
+
 TEST(place, refuses_free_layers) {
   auto g = boxy_tee();
   g.free_layers.push_back({.id = 0, .name = "yoke", .panels = {1}, .on = {0}});

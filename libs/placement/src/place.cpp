@@ -32,6 +32,8 @@ constexpr double kArmTransition = 0.08;   // from the trunk's side to where arms
 constexpr double kNarrow = 0.01;          // cloth may lack this part of a girth before it is refused: it can slide to where it fits
 constexpr double kSleeveGap = 0.004;       // between a sleeve and the trunk's panels at the start [m]
 constexpr double kLevel = 3;              // of edge lengths from one mesh to the next
+constexpr double kRound = 0.005;          // sections of a cone leave their circle, and circles their cone, by this part of the radius at most
+constexpr double kUpright = 0.001;        // a cone's slope under which it is a cylinder
 constexpr double kSheet = 0.004;           // between sheets that lie on one another at the start [m]
 
 double polygon_perimeter(const Points2& p) {
@@ -86,6 +88,65 @@ double width_at(const mesh::GarmentMesh& garment, const Layout& layout, const st
     panels->erase(std::unique(panels->begin(), panels->end()), panels->end());
   }
   return sum;
+}
+
+// Panels that nothing is sewn or fastened to.
+bool loose(const mesh::GarmentMesh& garment) { return garment.welds.empty() && garment.fasteners.empty(); }
+
+// An upright round cone or cylinder that a part of the trunk is.
+struct RoundCone {
+  double x = 0, z = 0;       // of the axis [m]
+  double radius = 0, y = 0;  // at a height [m]
+  double slope = 0;          // of the radius over the height; 0: a cylinder
+
+  // uv from a middle that lies on the ruling in the direction `out` (horizontal, unit), at height h on the cone.
+  Vector3d point(const Vector3d& out, double h, double offset, const Vector2d& uv) const {
+    const double stretch = std::sqrt(1 + slope * slope);
+    const double r = radius + slope * (h - y) + offset * stretch;
+    Frame frame;
+    frame.origin = Vector3d(x, h, z) + r * out;
+    frame.up = (Vector3d::UnitY() + slope * out) / stretch;
+    frame.across = frame.up.cross((out - slope * Vector3d::UnitY()) / stretch);
+    return slope == 0 ? on_cylinder(frame, r, uv) : on_cone(frame, r, -r * stretch / slope, uv);
+  }
+};
+
+// ret  nothing where the sections from low to high are not round about one axis (within kRound)
+std::optional<RoundCone> round_cone(const BodyFrame& frame, double low, double high) {
+  std::vector<double> y, r;
+  std::vector<Vector2d> middles;
+  for (const Section& section : frame.sections) {
+    if (section.merged || section.y < low - 0.01 || section.y > high + 0.01) continue;
+    const Vector2d middle = 0.5 * (section.hull.colwise().minCoeff() + section.hull.colwise().maxCoeff()).transpose();
+    double least = 1e9, greatest = 0;
+    for (Eigen::Index i = 0; i < section.hull.rows(); ++i) {
+      const double d = (section.hull.row(i).transpose() - middle).norm();
+      least = std::min(least, d);
+      greatest = std::max(greatest, d);
+    }
+    if (greatest - least > kRound * greatest || (!middles.empty() && (middle - middles.front()).norm() > kRound * greatest)) return std::nullopt;
+    y.push_back(section.y);
+    r.push_back(greatest);
+    middles.push_back(middle);
+  }
+  if (y.size() < 3) return std::nullopt;
+  const auto n = static_cast<double>(y.size());
+  double sy = 0, sr = 0, syy = 0, syr = 0;
+  for (std::size_t i = 0; i < y.size(); ++i) sy += y[i] / n, sr += r[i] / n;
+  for (std::size_t i = 0; i < y.size(); ++i) syy += (y[i] - sy) * (y[i] - sy), syr += (y[i] - sy) * (r[i] - sr);
+  RoundCone cone{middles.front().y(), middles.front().x(), sr, sy, syr / syy};
+  double above = 0;
+  for (std::size_t i = 0; i < y.size(); ++i) {
+    const double off = r[i] - sr - cone.slope * (y[i] - sy);
+    if (std::abs(off) > kRound * sr) return std::nullopt;
+    above = std::max(above, off);
+  }
+  cone.radius += above;
+  if (std::abs(cone.slope) < kUpright) {
+    cone.slope = 0;
+    cone.radius = *std::max_element(r.begin(), r.end());
+  }
+  return cone;
 }
 
 // The axis of a sleeve: the straight line next to the trunk, from there the smoothed middles of the arm, with a frame carried
@@ -330,12 +391,14 @@ Result<Start> bend(const mesh::GarmentMesh& garment, const FoldedFlat& folded, c
     const Points2 hull = hull_at(start.flattening.depth);
     const Vector2d axis(start.flattening.z_middle, frame.x_mid);
     const ConvexSection section(hull, spare(start.flattening.depth), axis, Vector2d(1, 0));
+    const std::optional<RoundCone> cone = loose(garment) ? round_cone(frame, low, high) : std::nullopt;
     // Sheets that lie on others: on parallel curves, each panel's middle facing where it would be on the first.
     std::map<double, ConvexSection> outer;
-    std::vector<double> middle(garment.panels.size(), 0), count(garment.panels.size(), 0);
+    std::vector<double> middle(garment.panels.size(), 0), middle_height(garment.panels.size(), 0), count(garment.panels.size(), 0);
     for (Eigen::Index v = 0; v < n; ++v) {
       const auto p = static_cast<std::size_t>(garment.vertex_panel[v]);
       middle[p] += flat[static_cast<std::size_t>(v)].x();
+      middle_height[p] += flat[static_cast<std::size_t>(v)].y();
       count[p] += 1;
     }
     for (Eigen::Index v = 0; v < n; ++v) {
@@ -343,6 +406,13 @@ Result<Start> bend(const mesh::GarmentMesh& garment, const FoldedFlat& folded, c
       const auto p = static_cast<std::size_t>(garment.vertex_panel[v]);
       const double a = flat[static_cast<std::size_t>(v)].x(), level = sheet[static_cast<std::size_t>(v)];
       Vector2d at = section.point(a);
+      if (cone) {
+        // Each panel's middle on the ruling before it, from there along the cone.
+        const Vector2d centre(middle[p] / count[p], middle_height[p] / count[p]);
+        const Vector2d out = section.normal(centre.x());
+        start.x.row(v) = cone->point(Vector3d(out.y(), 0, out.x()), centre.y(), params.offset + kSheet * level, flat[static_cast<std::size_t>(v)] - centre).transpose();
+        continue;
+      }
       if (level > 0) {
         const ConvexSection& curve = outer.try_emplace(level, hull, spare(start.flattening.depth) + kSheet * level, axis, Vector2d(1, 0)).first->second;
         const double centre = middle[p] / count[p];
@@ -554,7 +624,7 @@ Result<Placed> place_as_given(const mesh::GarmentMesh& sewn, const mesh::Support
   };
   // Nothing to draw together: where the bent panels lie clear of the support and of one another, they stay as they were rolled.
   const auto rolled_is_clear = [&] {
-    if (!garment.welds.empty() || !garment.fasteners.empty() || start.flattening.depth < 1) return false;
+    if (!loose(garment) || start.flattening.depth < 1) return false;
     mesh::GarmentMesh bent = garment;
     bent.x = start.x;
     const Report report = measure(bent, support);
