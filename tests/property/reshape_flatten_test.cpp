@@ -147,6 +147,16 @@ TEST(reshape_flatten, darts_are_proposed_and_cut) {
   EXPECT_TRUE(pattern::check(cut->pattern).empty());
 }
 
+TEST(reshape_flatten, no_dart_where_cloth_is_missing) {
+  // A saddle would need a gusset: cut open its border gapes the other way.
+  reshape::FlattenParams p = one_piece();
+  p.limit = 0.01;
+  const auto flat = reshape::flatten(sheet(16, 16, [](double u, double v) { return Vector3d(u, v, 2 * (u - 0.5) * (v - 0.5)); }), p);
+  ASSERT_TRUE(flat) << to_string(flat.issues().front());
+  EXPECT_GT(flat->pieces[0].max_strain, 0.01);
+  EXPECT_FALSE(flat->pieces[0].dart);
+}
+
 /// A quarter of a cap between two paths from the rim to the pole, and the next one.
 reshape::FlattenParams quarters() {
   reshape::FlattenParams p = cap_params();

@@ -180,17 +180,28 @@ std::optional<Dart> best_dart(const Cloth& cloth, const std::vector<std::vector<
     const Points2 uv = unfold(open_piece.x, open_piece.faces, 1e-5);
     const Distortion d = distortion(open_piece, uv);
     if (d.turned > 0) return;
-    std::vector<Eigen::Index> mouths;
-    for (std::size_t v = 0; v < open_piece.origin.size(); ++v) {
-      if (open_piece.origin[v] == trials[i].mouth) mouths.push_back(static_cast<Eigen::Index>(v));
+    // Counter-clockwise the border runs from the mouth down one leg to the tip and up the other: the gap is on its right.
+    const std::vector<int> loop = mesh::border_loops(open_piece.faces).front();
+    const auto origin = [&](std::size_t k) { return open_piece.origin[static_cast<std::size_t>(loop[k % loop.size()])]; };
+    const auto in_dart = [&](std::size_t k) { return mesh.lines.count(edge_key(origin(k), origin(k + 1))) > 0; };
+    std::size_t start = 0;
+    while (start < loop.size() && !(in_dart(start) && !in_dart(start + loop.size() - 1))) ++start;
+    if (start == loop.size()) return;
+    std::size_t count = 0;
+    while (in_dart(start + count)) ++count;
+    if (count != 2 * mesh.lines.size()) return;
+    const auto place = [&](std::size_t k) { return Vector2d(uv.row(loop[(start + k) % loop.size()])); };
+    const Vector2d down = (place(count / 2) - place(0)).normalized();
+    for (std::size_t k = 0; k < count / 2; ++k) {
+      const Vector2d across = place(count - k) - place(k);
+      if (down.x() * across.y() - down.y() * across.x() > 1e-5) return;  // legs that overlap: there cloth is missing, not left over
     }
-    if (mouths.size() != 2) return;
     DartProposal p;
     p.apex = mesh.x[static_cast<std::size_t>(trials[i].apex)];
     p.mouth = mesh.x[static_cast<std::size_t>(trials[i].mouth)];
     p.edge = names[trials[i].stretch];
     for (const auto& [edge, line] : mesh.lines) p.length += (mesh.x[static_cast<std::size_t>(edge.first)] - mesh.x[static_cast<std::size_t>(edge.second)]).norm();
-    p.intake = (uv.row(mouths[0]) - uv.row(mouths[1])).norm();
+    p.intake = (place(count) - place(0)).norm();
     p.rms_strain = d.rms;
     p.max_strain = d.largest;
     results[i] = p;
