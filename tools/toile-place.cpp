@@ -3,6 +3,7 @@
 #include "toile/reshape/flatten.h"
 #include "toile/stage/stage.h"
 
+#include <map>
 #include <numbers>
 
 namespace {
@@ -16,7 +17,7 @@ struct PlaceStage {
 
   static stage::Description description() {
     return {.name = "toile-place",
-            .version = 7,
+            .version = 8,
             .summary = "Bends sewn flat panels around a body without stretching them and draws their seams together.",
             .example = "toile-place layered.ply form.ply -o placed.ply",
             .details = "Each panel goes on the trunk or on an arm, as its name and its seams say (front, back, waistband, sleeve), or as `panels` "
@@ -25,7 +26,8 @@ struct PlaceStage {
                        "them, with the largest edge strain, the angle of the warp from its wanted direction, the smallest gap to the body and any intersections; "
                        "the file has them as columns (edge_strain, ease, seam_gap of vertices; warp_angle, cuts of faces). The body needs no landmarks: "
                        "waist, hips, armpits, shoulders and arms are found from its sections. With `start` panels begin where the panels of the same names in that file are, through "
-                       "their panel coordinates, and are relaxed from there. docs/placement.md says how.",
+                       "their panel coordinates, and are relaxed from there. With `lines` in the spec the support is a frame instead (a soft top's bows, a tarpaulin's poles): named "
+                       "lines of panels go to named curves, and the cloth is spread between them. docs/placement.md says how.",
             .inputs = {{.name = "garment", .doc = "sewn garment (flat panels)", .kind = stage::FileKind::garment},
                        {.name = "support", .doc = "body or dress form: closed, upright, facing +z, arms held away", .kind = stage::FileKind::support},
                        {.name = "start", .doc = "garment with panels of the same names and where they begin, such as the map of toile-flatten", .kind = stage::FileKind::garment, .required = false}},
@@ -56,8 +58,10 @@ struct PlaceStage {
     run.report("self_intersections", report.self_intersections.size());
     run.report("mean_seam_gap", report.mean_seam_gap, "m");
     run.report("max_seam_gap", report.largest_seam_gap, "m");
-    run.report("mean_warp_angle", degrees(report.mean_warp_angle), "deg");
-    run.report("max_warp_angle", degrees(report.largest_warp_angle), "deg");
+    if (!report.warp_angles.empty()) {
+      run.report("mean_warp_angle", degrees(report.mean_warp_angle), "deg");
+      run.report("max_warp_angle", degrees(report.largest_warp_angle), "deg");
+    }
     for (const placement::WarpAngle& angle : report.warp_angles) {
       const std::string& name = garment.panels[static_cast<std::size_t>(angle.panel)].name;
       run.report("mean_warp_angle_" + name, degrees(angle.mean), "deg");
@@ -67,6 +71,16 @@ struct PlaceStage {
       const std::string& name = garment.seams[static_cast<std::size_t>(seam.seam)].name;
       run.report("mean_gap_" + name, seam.mean, "m");
       run.report("max_gap_" + name, seam.largest, "m");
+    }
+    std::map<std::string, int> uses;
+    for (std::size_t i = 0; i < placed.lines.size(); ++i) {
+      const placement::HeldLine& line = placed.lines[i];
+      const int use = ++uses[line.curve];
+      const std::string name = use == 1 ? line.curve : fmt::format("{}_{}", line.curve, use);
+      run.report("length_on_" + name, line.length, "m");
+      run.report("length_of_" + name, line.curve_length, "m");
+      run.report("mean_gap_" + name, placed.line_gaps[i].mean, "m");
+      run.report("max_gap_" + name, placed.line_gaps[i].largest, "m");
     }
     return stage::Output{std::move(placed.garment), std::move(placed.findings), {}};
   }

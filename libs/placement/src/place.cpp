@@ -559,6 +559,52 @@ void conclude(Placed& placed, const mesh::SupportMesh& support, const PlaceParam
   }
 }
 
+RelaxOptions relax_options(const PlaceParams& params) {
+  RelaxOptions options;
+  options.offset = params.offset;
+  options.clearance = params.clearance;
+  options.thickness = params.thickness;
+  options.closing_steps = params.closing_steps;
+  options.swelling_steps = params.swelling_steps;
+  options.settling_steps = params.settling_steps;
+  options.polishing_steps = params.polishing_steps;
+  options.max_strain = kPolish * params.max_strain;
+  options.rms_strain = kPolish * params.rms_strain;
+  options.seam = params.seam;
+  options.bending = params.bending;
+  return options;
+}
+
+// Between the curves of a frame. The cloth has no large folds to form: no coarse mesh, no flattened support.
+Result<Placed> place_on_frame(const mesh::GarmentMesh& garment, const mesh::SupportMesh& frame, const PlaceParams& params, const std::function<void(double)>& progress) {
+  Placed placed;
+  placed.garment = garment;
+  TOILE_TRY(placed.lines, held_lines(garment, frame, params.curves, params.lines));
+  TOILE_TRY(const Points3 start, spread(garment, placed.lines, params.thickness));
+  RelaxOptions options = relax_options(params);
+  options.closing_steps = options.swelling_steps = 0;
+  options.progress = progress;
+  for (const HeldLine& line : placed.lines) options.targets.insert(options.targets.end(), line.targets.begin(), line.targets.end());
+  // What spreading has bent is meant to be.
+  options.rolled = start;
+  placed.garment.x = relax(garment, start, frame, options);
+  conclude(placed, frame, params, {});
+  for (const HeldLine& line : placed.lines) {
+    placed.line_gaps.push_back(line_gap(line, placed.garment.x));
+    if (std::abs(line.length / line.curve_length - 1) > params.line_tolerance) {
+      placed.findings.push_back({.code = "line_length", .place = {.item = "line " + line.name},
+                                 .what = fmt::format("{:.1f} mm of cloth lie on {:.1f} mm of curve '{}'", 1e3 * line.length, 1e3 * line.curve_length, line.curve),
+                                 .remedy = "change the pattern or the curve, or allow more by line_tolerance", .category = Category::check});
+    }
+    if (placed.line_gaps.back().largest <= params.max_line_gap) continue;
+    placed.findings.push_back({.code = "line_gap", .place = {.item = "line " + line.name},
+                               .what = fmt::format("it lies up to {:.1f} mm from curve '{}' ({:.1f} mm of cloth on {:.1f} mm)", 1e3 * placed.line_gaps.back().largest, line.curve,
+                                                   1e3 * line.length, 1e3 * line.curve_length),
+                               .remedy = "check the line's direction and lengths, or allow more by max_line_gap", .category = Category::check});
+  }
+  return placed;
+}
+
 Result<Placed> place_as_given(const mesh::GarmentMesh& sewn, const mesh::SupportMesh& support, const PlaceParams& params, const std::function<void(double)>& progress) {
   if (!sewn.free_layers.empty()) {
     Issues issues;
@@ -574,19 +620,8 @@ Result<Placed> place_as_given(const mesh::GarmentMesh& sewn, const mesh::Support
   const FoldedFlat folded_flat = fold_flat(garment);
   TOILE_TRY(const Layout layout, make_layout(garment, folded_flat, support, frame, params));
   TOILE_TRY(const Start start, bend(garment, folded_flat, frame, layout, params));
-  RelaxOptions options;
-  options.offset = params.offset;
-  options.clearance = params.clearance;
-  options.thickness = params.thickness;
+  RelaxOptions options = relax_options(params);
   options.flattening = start.flattening;
-  options.closing_steps = params.closing_steps;
-  options.swelling_steps = params.swelling_steps;
-  options.settling_steps = params.settling_steps;
-  options.polishing_steps = params.polishing_steps;
-  options.max_strain = kPolish * params.max_strain;
-  options.rms_strain = kPolish * params.rms_strain;
-  options.seam = params.seam;
-  options.bending = params.bending;
   Placed placed;
   placed.garment = sewn;
   for (int fold : stuck) {
@@ -683,6 +718,7 @@ Result<Placed> place_as_given(const mesh::GarmentMesh& sewn, const mesh::Support
 // Work is done on one of the two mirror images, so that a mirrored garment on a mirrored support gives the mirrored result
 // to the last bit.
 Result<Placed> place(const mesh::GarmentMesh& sewn, const mesh::SupportMesh& support, const PlaceParams& params, const std::function<void(double)>& progress) {
+  if (!params.lines.empty()) return place_on_frame(sewn, support, params, progress);
   if (!left_handed(support)) return place_as_given(sewn, support, params, progress);
   TOILE_TRY(Placed placed, place_as_given(mirrored(sewn), mirrored(support), mirrored(params), progress));
   const Points3 x = mirrored(placed.garment).x;
@@ -722,18 +758,9 @@ Points3 lifted(const Points3& x, const mesh::SupportMesh& support, double offset
 }  // namespace
 
 Placed place_from(const mesh::GarmentMesh& sewn, const Points3& start, const mesh::SupportMesh& support, const PlaceParams& params, const std::function<void(double)>& progress) {
-  RelaxOptions options;
-  options.offset = params.offset;
-  options.clearance = params.clearance;
-  options.thickness = params.thickness;
-  options.closing_steps = 0;
-  options.swelling_steps = 0;
+  RelaxOptions options = relax_options(params);
+  options.closing_steps = options.swelling_steps = 0;
   options.settling_steps = params.fine_steps;
-  options.polishing_steps = params.polishing_steps;
-  options.max_strain = kPolish * params.max_strain;
-  options.rms_strain = kPolish * params.rms_strain;
-  options.seam = params.seam;
-  options.bending = params.bending;
   const Points3 x = lifted(start, support, params.offset);
   options.rolled = x;
   options.progress = progress;

@@ -469,6 +469,13 @@ class Relaxation {
         x_.row(weld.b) -= (move / length) * d;
       }
     }
+    if (step.closed_seam > 0) {
+      for (const Target& target : options_.targets) {
+        const Eigen::RowVector3d d = target.at.transpose() - x_.row(target.vertex);
+        const double length = d.norm();
+        if (length > 0) x_.row(target.vertex) += std::min(step.closed_seam, kSeamMove / length) * d;
+      }
+    }
     if (step.seam > 0) {
       for (const mesh::Fastener& fastener : garment_.fasteners) {
         if (!fastener.closed) continue;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "toile/base/fields.h"
+#include "toile/placement/frame_params.h"
 
 #include <array>
 #include <map>
@@ -83,6 +84,10 @@ struct PlaceParams {
   int fine_steps = 20;
   int polishing_steps = 200;
   std::map<std::string, PanelSpec> panels;
+  std::map<std::string, FrameCurve> curves;
+  std::vector<FrameLine> lines;
+  double max_line_gap = 0.01;
+  double line_tolerance = 0.02;
   static void describe(auto& f) {
     f(&PlaceParams::offset, {.key = "offset", .doc = "wanted distance of the cloth from the support", .unit = "m", .min = 0, .max = 0.2});
     f(&PlaceParams::clearance, {.key = "clearance", .doc = "smallest distance of a cloth vertex from the support at the end", .unit = "m", .min = 1e-4, .max = 0.1});
@@ -99,6 +104,10 @@ struct PlaceParams {
     f(&PlaceParams::fine_steps, {.key = "fine_steps", .doc = "steps on the fine mesh over which its seams close once more and let go", .min = 1, .max = 10000});
     f(&PlaceParams::polishing_steps, {.key = "polishing_steps", .doc = "most steps in which stretch is taken out", .min = 0, .max = 100000});
     f(&PlaceParams::panels, {.key = "panels", .doc = "settings of single panels, by name"});
+    f(&PlaceParams::curves, {.key = "curves", .doc = "curves of a frame, by name"});
+    f(&PlaceParams::lines, {.key = "lines", .doc = "lines of the garment that lie on curves; with any, the support is a frame, not a body, and the cloth is spread between the curves"});
+    f(&PlaceParams::max_line_gap, {.key = "max_line_gap", .doc = "a line that lies farther from its curve at any vertex is a finding", .unit = "m", .min = 0, .max = 10});
+    f(&PlaceParams::line_tolerance, {.key = "line_tolerance", .doc = "a line longer or shorter than its curve by more than this part is a finding", .unit = "1", .min = 0, .max = 10});
     f.check([](const PlaceParams& p, Issues& issues) {
       if (p.clearance > p.offset) {
         issues.push_back({.code = "bad_range", .place = {.item = "clearance"}, .what = "the clearance is larger than the offset",

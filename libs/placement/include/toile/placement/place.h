@@ -5,6 +5,7 @@
 #include "toile/base/result.h"
 #include "toile/mesh/garment_mesh.h"
 #include "toile/mesh/support_mesh.h"
+#include "toile/placement/fit_up.h"
 #include "toile/placement/flatten.h"
 #include "toile/placement/layout.h"
 #include "toile/placement/params.h"
@@ -19,11 +20,14 @@ namespace toile::placement {
 struct Placed {
   mesh::GarmentMesh garment;
   Report report;
+  std::vector<HeldLine> lines;      ///< where params name some
+  std::vector<LineGap> line_gaps;  ///< of them
   Issues findings;  ///< checks that failed (Category::check)
   Issues warnings;  ///< what was left to the simulation
 };
 
-/// error  what make_layout refuses; "too_narrow" for panels that cannot go round their part of the support
+/// With params.lines the garment is spread between curves of a frame (fit_up.h), otherwise laid round a body.
+/// error  what make_layout, held_lines and spread refuse; "too_narrow" for panels that cannot go round their part of the support
 Result<Placed> place(const mesh::GarmentMesh& garment, const mesh::SupportMesh& support, const PlaceParams& params,
                      const std::function<void(double)>& progress = {});
 

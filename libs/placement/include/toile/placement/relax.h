@@ -5,6 +5,7 @@
 
 #include "toile/mesh/garment_mesh.h"
 #include "toile/mesh/support_mesh.h"
+#include "toile/placement/fit_up.h"
 #include "toile/placement/flatten.h"
 
 #include <functional>
@@ -28,6 +29,7 @@ struct RelaxOptions {
   double seam = 0.05;          ///< part of a seam's gap that one sweep closes
   double bending = 0.1;        ///< part of a curvature that one sweep takes out, until polishing
   Points3 rolled;              ///< |V| x 3 or empty: bending up to the curvature there is free [m]
+  std::vector<Target> targets; ///< vertices drawn to places as seams that start closed are, until they let go
   std::function<void(double)> progress;  ///< called with 0..1 if given
 };
 
