@@ -86,6 +86,35 @@ TEST_F(round_trip, darts_are_cut_and_sewn) {
   EXPECT_EQ(mesh::border_loops(whole).size(), 4u);
 }
 
+TEST_F(round_trip, a_placed_garment_gives_its_panels_back) {
+  ASSERT_EQ(run("toile-form' " + source("samples/measurements/man178.yaml") + " -o form.ply --sex male --vertices 3000 --arm_angle '50 deg'"), 0) << log();
+  ASSERT_EQ(run("toile-mesh' " + source("samples/patterns/tee.yaml") + " -o panels.ply --cell '20 mm'"), 0) << log();
+  ASSERT_EQ(run("toile-sew' panels.ply --spec " + source("pipelines/tee/seams.yaml") + " -o sewn.ply"), 0) << log();
+  ASSERT_EQ(run("toile-place' sewn.ply form.ply --spec " + source("pipelines/tee/placement.yaml") + " -o placed.ply"), 0) << log();
+  ASSERT_EQ(run("toile-flatten' placed.ply --spec " + source("samples/reshaping/tee.yaml") + " -o pattern.yaml --map map.ply"), 0) << log();
+  const auto sewn = io::read_garment((folder_ / "placed.ply").string()), map = io::read_garment((folder_ / "map.ply").string());
+  ASSERT_TRUE(sewn && map);
+  ASSERT_EQ(map->panels.size(), sewn->panels.size());
+  const Eigen::VectorXd before = mesh::rest_areas(*sewn), after = mesh::rest_areas(*map);
+  for (const mesh::Panel& panel : sewn->panels) {
+    const auto found = mesh::find_panel(*map, panel.name);
+    ASSERT_TRUE(found);
+    double a = 0, b = 0;
+    for (Eigen::Index f = 0; f < before.size(); ++f) a += sewn->face_panel[f] == panel.id ? before[f] : 0;
+    for (Eigen::Index f = 0; f < after.size(); ++f) b += map->face_panel[f] == *found ? after[f] : 0;
+    // Seams are not quite closed: each side is taken to the middle, by half the gap on every cell of 20 mm.
+    double between = 0;
+    for (const mesh::Weld& weld : sewn->welds) {
+      const double half = (sewn->x.row(weld.a) - sewn->x.row(weld.b)).norm() / 2;
+      for (const int v : {weld.a, weld.b}) between += sewn->vertex_panel[v] == panel.id ? half * 0.02 : 0;
+    }
+    EXPECT_LT(std::abs(b - a), 0.005 * a + between) << panel.name;
+    if (panel.piece != "sleeve") {
+      EXPECT_NEAR(b / a, 1, 0.02) << panel.name;
+    }
+  }
+}
+
 TEST_F(round_trip, a_reshaped_form_goes_the_same_way) {
   ASSERT_EQ(run("toile-form' " + source("samples/measurements/man178.yaml") + " -o form.ply --sex male --vertices 3000 --arm_angle '50 deg'"), 0) << log();
   ASSERT_EQ(run("toile-deform' form.ply --spec " + source("samples/reshaping/wider.yaml") + " -o wider.ply"), 0) << log();

@@ -276,6 +276,18 @@ Result<std::vector<Piece>> take_pieces(const Cutting& cutting, const std::map<st
                         "lead the lines between the two farther, until they meet others, or leave one of the two out"});
       continue;
     }
+    bool manifold = true;
+    for (const int f : members[static_cast<std::size_t>(id)]) {
+      const auto& face = mesh.faces[static_cast<std::size_t>(f)];
+      for (std::size_t k = 0; k < 3; ++k) {
+        const EdgeKey edge = edge_key(face[k], face[(k + 1) % 3]);
+        if (!mesh.lines.count(edge) && beside.at(edge).size() > 2) manifold = false;
+      }
+    }
+    if (!manifold) {
+      issues.push_back({"not_a_disk", {.item = "pieces." + name}, "three and more panels meet in a seam inside it", "cut along that seam (`seam`)"});
+      continue;
+    }
     Piece piece;
     piece.name = name;
     piece.cloth = open_cloth(mesh, members[static_cast<std::size_t>(id)]);
