@@ -19,7 +19,8 @@ namespace {
 class round_trip : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::path(testing::TempDir()) / "toile_round_trip";
+    // Tests run side by side.
+    folder_ = fs::path(testing::TempDir()) / (std::string("toile_round_trip_") + testing::UnitTest::GetInstance()->current_test_info()->name());
     fs::remove_all(folder_);
     fs::create_directories(folder_);
   }
