@@ -727,25 +727,29 @@ void evaluate(const ParticleModel& m, const Points3& x, const Points3& link_offs
   for (const Link& link : m.links) add_pair(link.a, link.b, Block::from(link.stiffness * Matrix3d::Identity()));
 }
 
-double frequency_bound(const ParticleModel& m, const Points3& x) {
-  ParticleResponse response;
-  const Points3 offset = Points3::Zero(static_cast<Eigen::Index>(m.links.size()), 3);
-  evaluate(m, x, offset, Curvature::positive, response);
-  return std::sqrt(parallel_reduce(static_cast<std::size_t>(m.node_count), grain, 0.0, [&](std::size_t begin, std::size_t end) {
+double frequency_bound(const BlockMatrix& matrix, const Eigen::VectorXd& masses) {
+  return std::sqrt(parallel_reduce(static_cast<std::size_t>(matrix.rows()), grain, 0.0, [&](std::size_t begin, std::size_t end) {
     double most = 0;
     for (std::size_t i = begin; i < end; ++i) {
-      const double mass = m.mass[static_cast<Eigen::Index>(i)];
+      const double mass = masses[static_cast<Eigen::Index>(i)];
       if (!(mass > 0)) continue;
       // Row sums of M^-1/2 H M^-1/2, block by block in the Frobenius norm.
       double sum = 0;
-      for (int k = m.row_start[i]; k < m.row_start[i + 1]; ++k) {
-        const double other = m.mass[m.column[static_cast<std::size_t>(k)]];
-        if (other > 0) sum += response.matrix.value[static_cast<std::size_t>(k)].matrix().norm() / std::sqrt(mass * other);
+      for (int k = matrix.row_start[i]; k < matrix.row_start[i + 1]; ++k) {
+        const double other = masses[matrix.column[static_cast<std::size_t>(k)]];
+        if (other > 0) sum += matrix.value[static_cast<std::size_t>(k)].matrix().norm() / std::sqrt(mass * other);
       }
       most = std::max(most, sum);
     }
     return most;
   }, [](double a, double b) { return std::max(a, b); }));
+}
+
+double frequency_bound(const ParticleModel& m, const Points3& x) {
+  ParticleResponse response;
+  const Points3 offset = Points3::Zero(static_cast<Eigen::Index>(m.links.size()), 3);
+  evaluate(m, x, offset, Curvature::positive, response);
+  return frequency_bound(response.matrix, m.mass);
 }
 
 }  // namespace toile::mechanics

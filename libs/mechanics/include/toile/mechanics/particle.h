@@ -108,8 +108,10 @@ void evaluate(const ParticleModel& model, const Points3& x, const Points3& link_
 /// Only the gradient: what explicit integration needs, many times.
 void gradient(const ParticleModel& model, const Points3& x, const Points3& link_offset, ParticleResponse& response);
 
-/// Largest angular frequency that the model can have around x, from above [1/s]: the root of the largest row sum of the second
-/// derivative over the mass. Explicit steps must stay below 2 over it.
+/// Largest angular frequency of a second derivative with these masses, from above [1/s]: the root of the largest row sum.
+/// Explicit steps must stay below 2 over it. Nodes without mass are left out.
+double frequency_bound(const BlockMatrix& matrix, const Eigen::VectorXd& mass);
+/// Of the model around x.
 double frequency_bound(const ParticleModel& model, const Points3& x);
 
 }  // namespace toile::mechanics
