@@ -6,20 +6,6 @@
 namespace toile::dynamics {
 namespace {
 
-using contact::Kind;
-
-/// Which entries of node[] are cloth nodes: [first, last).
-std::pair<int, int> cloth_nodes(Kind kind) {
-  switch (kind) {
-    case Kind::vertex_face:
-    case Kind::edge_edge: return {0, 4};
-    case Kind::vertex_support_face: return {0, 1};
-    case Kind::support_vertex_face: return {1, 4};
-    case Kind::edge_support_edge: return {0, 2};
-  }
-  return {0, 0};
-}
-
 Eigen::Vector3d gap_vector(const Contact& c, const Points3& x, const Points3& support_x) {
   const auto [first, last] = cloth_nodes(c.kind);
   Eigen::Vector3d gap = Eigen::Vector3d::Zero();
@@ -65,6 +51,19 @@ Eigen::Vector3d relative_motion(const FrictionPair& pair, const Points3& start, 
 bool same_key(const FrictionPair& p, const Contact& c) { return p.kind == c.kind && p.a == c.a && p.b == c.b; }
 
 }  // namespace
+
+using contact::Kind;
+
+std::pair<int, int> cloth_nodes(Kind kind) {
+  switch (kind) {
+    case Kind::vertex_face:
+    case Kind::edge_edge: return {0, 4};
+    case Kind::vertex_support_face: return {0, 1};
+    case Kind::support_vertex_face: return {1, 4};
+    case Kind::edge_support_edge: return {0, 2};
+  }
+  return {0, 0};
+}
 
 Repulsion repulsion(const ContactLaw& law, double gap) {
   if (gap >= law.reach) return {0, 0, 0};

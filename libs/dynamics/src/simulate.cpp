@@ -7,6 +7,7 @@
 #include "toile/dynamics/constraints.h"
 #include "toile/dynamics/contact_force.h"
 #include "toile/dynamics/linear_solver.h"
+#include "toile/dynamics/provot.h"
 #include "toile/mechanics/sheet.h"
 
 #include <fmt/format.h>
@@ -35,6 +36,10 @@ constexpr double solver_tolerance = 0.02;
 constexpr int solver_iterations_max = 300;
 // Relaxation: part of the last move that the next step starts with (until the energy rises), and the step's control.
 constexpr double momentum = 0.95;
+// Explicit integration: pairs are listed this part of the reach beyond it.
+constexpr double contact_skin = 0.5;
+constexpr double safe_step = 0.4;     // of the largest step that is certainly stable
+constexpr double log_every = 2e-3;    // simulated time between rows of log and record [s]
 constexpr double step_max = 2;        // [s]
 constexpr double quiet_move = 2e-4;   // below it the step grows [m]
 constexpr int stall_limit = 30;       // iterations without a better residual
@@ -103,7 +108,10 @@ class Run {
   bool try_merge();
   bool relax();
   void equilibria();
+  void read_velocities();
   void move_in_time();
+  Issues integrate_explicitly();
+  void list_contacts(const Points3& x, ConstraintSet& set);
   void log_row(const char* phase_name);
   void record_row();
   void set_time(double time);
@@ -119,6 +127,8 @@ class Run {
   std::string log_;
 
   Sheet sheet_;
+  std::optional<mechanics::ParticleModel> particle_;  // takes the place of the sheet's energies
+  mechanics::ParticleResponse particle_response_;
   std::optional<contact::Search> search_;
   contact::Surface support_surface_;
   Points3 support_x_ = no_points;
@@ -218,6 +228,16 @@ Issues Run::build(const Ids& node_of_vertex) {
   Result<Sheet> sheet = mechanics::make_sheet(garment_, node_of_vertex, options);
   if (!sheet) return sheet.issues();
   sheet_ = std::move(*sheet);
+  if (params_.model == Model::particle) {
+    mechanics::ParticleOptions particle_options;
+    particle_options.edges = params_.edge_estimate;
+    particle_options.modulus = params_.modulus;
+    particle_options.link_stiffness = params_.seam_stiffness;
+    Result<mechanics::ParticleModel> particle = mechanics::make_particle(garment_, node_of_vertex, particle_options);
+    if (!particle) return particle.issues();
+    particle_ = std::move(*particle);
+    particle_response_ = {};
+  }
   response_ = {};
   solver_ = {};
   mesh::Triangles faces(garment_.face_count(), 3);
@@ -417,7 +437,16 @@ void Run::clear_start() {
 /// Energies, gradient and if asked the second derivative at x. Inertia is left to the caller.
 void Run::evaluate(const Points3& x, bool with_matrix) {
   phase("sheet");
-  mechanics::evaluate(sheet_, x, link_offset_, with_matrix ? std::optional(mechanics::Curvature::positive) : std::nullopt, response_);
+  const auto curvature = with_matrix ? std::optional(mechanics::Curvature::positive) : std::nullopt;
+  if (particle_) {
+    if (with_matrix) std::swap(response_.matrix, particle_response_.matrix);
+    mechanics::evaluate(*particle_, x, link_offset_, curvature, particle_response_);
+    if (with_matrix) std::swap(response_.matrix, particle_response_.matrix);
+    response_.energy = particle_response_.energy;
+    response_.gradient = particle_response_.gradient;
+  } else {
+    mechanics::evaluate(sheet_, x, link_offset_, curvature, response_);
+  }
   gradient_ = response_.gradient - sheet_.mass * gravity_.transpose() - load_;
   potential_ = -sheet_.mass.dot(x * gravity_) - load_.cwiseProduct(x).sum();
   phase("contact");
@@ -474,7 +503,7 @@ bool Run::iterate() {
     const double m = sheet_.mass[row] * inertia_rate_[row];
     const Eigen::Vector3d force = -(gradient_.row(row) + m * (x_.row(row) - inertia_.row(row))).transpose();
     rhs_[i] = mechanics::load3(force.data());
-    Block& d = response_.matrix.value[static_cast<std::size_t>(sheet_.diagonal[i])];
+    Block& d = response_.matrix.value[static_cast<std::size_t>(response_.matrix.diagonal[i])];
     for (int c = 0; c < 3; ++c) d.column[c][c] += static_cast<float>(m + drag * sheet_.area[row]);
   });
   const std::vector<Float4> given = prescribed();
@@ -489,7 +518,7 @@ bool Run::iterate() {
   if (driven) undriven = response_.matrix;
   for (std::size_t i = 0; i < n; ++i) {
     if (holder_[i] < 0) continue;
-    Block& d = response_.matrix.value[static_cast<std::size_t>(sheet_.diagonal[i])];
+    Block& d = response_.matrix.value[static_cast<std::size_t>(response_.matrix.diagonal[i])];
     if (fixed_[i]) {
       // A heavy diagonal holds the row; what is left of its motion is dropped below.
       rhs_[i] = Float4{};
@@ -686,7 +715,10 @@ void Run::close_seams() {
     const double part = std::max(0.0, 1 - static_cast<double>(i) / params_.closing_steps);
     link_offset_ = part * link_start_;
     // Sides that do not meet by now are pulled harder and harder.
-    if (i > params_.closing_steps + 5) mechanics::scale_links(sheet_, 1.25);
+    if (i > params_.closing_steps + 5) {
+      mechanics::scale_links(sheet_, 1.25);
+      if (particle_) mechanics::scale_links(*particle_, 1.25);
+    }
     evaluate(x_, true);
     iterate();
     log_row("closing");
@@ -786,11 +818,8 @@ void Run::equilibria() {
   report_.residual = static_residual();
 }
 
-void Run::move_in_time() {
-  gravity_part_ = 1;
-  link_offset_.setZero();
-  step_ = params_.time_step;
-  damped_ = params_.air_drag > 0;
+/// Velocities of a garment that moves already.
+void Run::read_velocities() {
   const auto column = [&](const char* name) { return garment_.vertex_columns.find(name); };
   if (column("vx") != garment_.vertex_columns.end() && column("vy") != garment_.vertex_columns.end() && column("vz") != garment_.vertex_columns.end()) {
     Points3 v(garment_.vertex_count(), 3);
@@ -802,6 +831,14 @@ void Run::move_in_time() {
     }
     velocity_.topRows(sheet_.cloth_nodes) = gather_mean(v, sheet_.node_of_vertex, sheet_.cloth_nodes);
   }
+}
+
+void Run::move_in_time() {
+  gravity_part_ = 1;
+  link_offset_.setZero();
+  step_ = params_.time_step;
+  damped_ = params_.air_drag > 0;
+  read_velocities();
   const int steps = std::max(1, static_cast<int>(std::lround(params_.duration / params_.time_step)));
   inertia_rate_.setConstant(1 / (step_ * step_));
   for (int i = 0; i < steps && !interrupted(); ++i) {
@@ -827,6 +864,216 @@ void Run::move_in_time() {
   evaluate(x_, true);
   report_.residual = static_residual();
   report_.converged = true;
+}
+
+/// Pairs near enough to touch before the list is made again, as unilateral constraints with their present normals.
+void Run::list_contacts(const Points3& x, ConstraintSet& set) {
+  contacts_ = search_->proximity(x, support_x_, {laws_.self.reach + contact_skin * laws_.self.reach, laws_.support.reach + contact_skin * laws_.support.reach});
+  set.contacts.clear();
+  contact_sums_ = {0, 0, std::max(laws_.self.reach, laws_.support.reach)};
+  const auto add = [&](const contact::Contact& c) {
+    const auto [first, last] = cloth_nodes(c.kind);
+    const ContactLaw& law = laws_.of(c.kind);
+    Eigen::Vector3d gap = Eigen::Vector3d::Zero();
+    for (int k = 0; k < 4; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      gap += c.weight[i] * (k >= first && k < last ? x : support_x_).row(c.node[i]).transpose();
+    }
+    const double distance = gap.norm();
+    if (distance < 1e-9) return;
+    Unilateral u;
+    u.normal = gap / distance;
+    u.offset = law.reach;
+    u.friction = law.friction;
+    bool moves = false;
+    for (int k = 0; k < 4; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      if (k >= first && k < last) {
+        u.node[i] = c.node[i];
+        u.weight[i] = c.weight[i];
+        moves |= c.weight[i] != 0 && !fixed_[static_cast<std::size_t>(c.node[i])];
+      } else {
+        u.offset -= c.weight[i] * u.normal.dot(support_x_.row(c.node[i]));
+      }
+    }
+    contact_sums_.least_gap = std::min(contact_sums_.least_gap, distance);
+    if (moves) set.contacts.push_back(u);
+  };
+  for (const contact::Contact& c : contacts_.self) add(c);
+  for (const contact::Contact& c : contacts_.support) add(c);
+}
+
+/// The published way: Euler in two steps, constraints and contacts by Lagrange multipliers, collisions looked at between the steps.
+/// error  "no_mass", "step_too_long"
+Issues Run::integrate_explicitly() {
+  gravity_part_ = 1;
+  link_offset_.setZero();
+  const bool rest = params_.mode == Mode::equilibrium;
+  if (!rest) read_velocities();
+  if (!(sheet_.mass.minCoeff() > 0)) {
+    return {Issue{"no_mass", {}, "a particle has no mass; explicit integration needs one", "give the cloth its fabric (toile-layer), or use the implicit integrator"}};
+  }
+  // Tables run with the simulated time; rest is looked for after their last rows.
+  double tables_end = params_.gravity_times.empty() ? 0 : params_.gravity_times.back();
+  bool ramped = !params_.gravity_times.empty();
+  for (const Load& load : loads_) {
+    if (load.spec.times.empty()) continue;
+    ramped = true;
+    tables_end = std::max(tables_end, load.spec.times.back());
+  }
+  for (const Held& held : held_) {
+    if (!held.spec.times.empty()) tables_end = std::max(tables_end, held.spec.times.back());
+  }
+  set_time(0);
+  const auto stable_limit = [&](const Points3& x) {
+    evaluate(x, true);
+    return 2 / mechanics::frequency_bound(response_.matrix, sheet_.mass);
+  };
+  const double first_limit = stable_limit(x_);
+  if (params_.explicit_step && *params_.explicit_step > first_limit) {
+    return {Issue{"step_too_long", {.item = "explicit_step"}, fmt::format("{:.3g} s is beyond the stability limit of explicit integration: steps up to {:.3g} s are certainly stable at the start", *params_.explicit_step, first_limit),
+                  "give a smaller explicit_step, or none"}};
+  }
+  phase("sheet");
+  ProvotSystem system;
+  system.mass = sheet_.mass;
+  if (!rest) system.drag = params_.air_drag * sheet_.area;
+  system.gradient = [&](const Points3& x, Points3& out) {
+    if (particle_) {
+      mechanics::gradient(*particle_, x, link_offset_, particle_response_);
+      out = particle_response_.gradient;
+    } else {
+      mechanics::evaluate(sheet_, x, link_offset_, std::nullopt, response_);
+      out = response_.gradient;
+    }
+    out -= sheet_.mass * gravity_.transpose() + load_;
+  };
+  ProvotOptions options;
+  options.time_step = params_.explicit_step.value_or(safe_step * first_limit);
+  options.damping = params_.explicit_damping.value_or(rest ? 10.0 : 0.0);
+  options.constraints.time_constant = 4 * options.time_step;
+  options.constraints.contact_time_constant = std::max(1e-3, 4 * options.time_step);
+  options.constraints.tolerance = 1e-6;
+  options.constraints.contact_sweeps = 40;
+  std::vector<int> held_nodes;  // in the order of the constraints: those at rest, then those on a path
+  for (const bool moving : {false, true}) {
+    for (const Held& held : held_) {
+      if (held.spec.times.empty() == moving) continue;
+      for (int node : held.nodes) {
+        held_nodes.push_back(node);
+        const Eigen::Vector3d start = hold_start_.row(node).transpose();
+        if (!moving) {
+          system.constraints.positions.push_back({node, start});
+          continue;
+        }
+        const double h = options.time_step;
+        system.constraints.trajectories.push_back({node, [&held, start, h](double time) {
+          const Eigen::Vector3d now = motion_at(held.spec, held.centre, time)(start);
+          return PathState{now, (motion_at(held.spec, held.centre, time + h)(start) - now) / h};
+        }});
+      }
+    }
+  }
+  Provot provot(std::move(system), {x_, velocity_, 0}, options);
+
+  // Nothing that is not in the list can touch before a node has moved half the skin. Then the straight ways since the last look
+  // are searched for impacts, and the list is made again.
+  Points3 checked = x_;
+  double checked_time = 0;
+  const double allowed = 0.5 * contact_skin * std::min(laws_.self.reach, support_ ? laws_.support.reach : laws_.self.reach);
+  list_contacts(x_, provot.system().constraints);
+  contact::LimitOptions limit_options;
+  limit_options.self_exempt = self_exempt_;
+  limit_options.support_exempt = support_exempt_;
+  provot.system().collisions = [&](const Points3&, Points3& end, Points3& velocity) {
+    const double moved_sq = parallel_reduce(static_cast<std::size_t>(end.rows()), std::size_t{4096}, 0.0, [&](std::size_t begin, std::size_t last) {
+      double most = 0;
+      for (std::size_t i = begin; i < last; ++i) most = std::max(most, (end.row(static_cast<Eigen::Index>(i)) - checked.row(static_cast<Eigen::Index>(i))).squaredNorm());
+      return most;
+    }, [](double a, double b) { return std::max(a, b); });
+    if (!(moved_sq > allowed * allowed)) return;
+    phase("limit");
+    const contact::StepLimit& limit = search_->limit_step(checked, end, support_x_, support_x_, limit_options);
+    last_fraction_ = limit.least_fraction;
+    if (limit.limited_nodes > 0) {
+      const double elapsed = std::max(provot.state().time + provot.time_step() - checked_time, provot.time_step());
+      for (Eigen::Index i = 0; i < end.rows(); ++i) {
+        if (limit.fraction[static_cast<std::size_t>(i)] >= 1) continue;
+        end.row(i) = limit.x.row(i);
+        velocity.row(i) = (end.row(i) - checked.row(i)) / elapsed;
+      }
+    }
+    phase("contact");
+    checked = end;
+    checked_time = provot.state().time + provot.time_step();
+    list_contacts(checked, provot.system().constraints);
+    phase("sheet");
+  };
+
+  const double until = rest ? tables_end + params_.settling_time : params_.duration;
+  double next_log = 0;
+  // Net forces, and what held particles are held with.
+  const auto read_forces = [&] {
+    gradient_ = -provot.force();
+    for (std::size_t i = 0; i < held_nodes.size(); ++i) gradient_.row(held_nodes[i]) = provot.constraints().holding_force(i).transpose();
+  };
+  bool stable = true;
+  int active_contacts = 0;
+  double limit_now = first_limit;
+  while (provot.state().time < until - 0.5 * provot.time_step() && !interrupted()) {
+    if (ramped) set_time(provot.state().time);
+    time_ = provot.state().time;
+    const ConstraintReport step = provot.step();
+    ++report_.iterations;
+    report_.solver_iterations += step.iterations;
+    active_contacts = step.active_contacts;
+    if (provot.state().time < next_log) continue;
+    next_log = provot.state().time + log_every;
+    stable = provot.state().x.allFinite();
+    if (!stable) break;
+    x_ = provot.state().x;
+    // Curves stiffen: the step follows. This also brings energies for the log.
+    const ContactSums sums = contact_sums_;
+    limit_now = stable_limit(x_);
+    contact_sums_ = sums;
+    contact_sums_.pairs = step.active_contacts;
+    stable = !(params_.explicit_step && *params_.explicit_step > limit_now);
+    if (!stable) break;
+    step_ = provot.time_step();
+    if (!params_.explicit_step && safe_step * limit_now < 0.9 * provot.time_step()) provot.set_time_step(safe_step * limit_now);
+    read_forces();
+    report_.residual = static_residual();
+    solve_report_.iterations = step.iterations;
+    last_move_ = provot.state().v.rowwise().norm().maxCoeff() * provot.time_step();
+    time_ = report_.simulated_time = provot.state().time;
+    log_row("explicit");
+    record_row();
+    if (hooks_.progress) hooks_.progress(0.2 + 0.8 * provot.state().time / until, fmt::format("t = {:.3f} s, residual {:.2e}", provot.state().time, report_.residual));
+    if (rest && provot.state().time >= tables_end && report_.residual <= params_.residual) {
+      report_.converged = true;
+      break;
+    }
+  }
+  if (!stable) {
+    findings_.push_back(Issue{"unstable", {}, fmt::format("the step of {:.3g} s went beyond the stability limit ({:.3g} s) after {} steps; the last sound state is written", provot.time_step(), limit_now, report_.iterations), "give a smaller explicit_step, or none", Category::check});
+    x_ = checked;
+    velocity_.setZero();
+    evaluate(x_, true);
+    report_.residual = static_residual();
+    return {};
+  }
+  // The end goes through the same check as all that was before it.
+  x_ = search_->limit_step(checked, provot.state().x, support_x_, support_x_, limit_options).x;
+  velocity_ = provot.state().v;
+  report_.simulated_time = provot.state().time;
+  if (!rest && !interrupted()) report_.converged = true;
+  const ContactSums sums = contact_sums_;
+  evaluate(x_, true);
+  contact_sums_ = sums;
+  contact_sums_.pairs = active_contacts;
+  if (report_.iterations > 0) read_forces();
+  report_.residual = static_residual();
+  return {};
 }
 
 void Run::check_end() {
@@ -905,7 +1152,10 @@ Result<SimulationOutcome> Run::go() {
   clear_start();
   close_seams();
   if (!interrupted()) {
-    if (params_.mode == Mode::equilibrium) {
+    if (params_.integrator == Integrator::provot) {
+      issues = integrate_explicitly();
+      if (!issues.empty()) return issues;
+    } else if (params_.mode == Mode::equilibrium) {
       equilibria();
     } else {
       move_in_time();

@@ -5,6 +5,7 @@
 #include "toile/contact/search.h"
 #include "toile/dynamics/linear_solver.h"
 
+#include <utility>
 #include <vector>
 
 namespace toile::dynamics {
@@ -23,6 +24,9 @@ struct ContactLaws {
   ContactLaw self, support;
   const ContactLaw& of(contact::Kind kind) const { return kind <= contact::Kind::edge_edge ? self : support; }
 };
+
+/// Which entries of Contact::node are cloth nodes: [first, last).
+std::pair<int, int> cloth_nodes(contact::Kind kind);
 
 /// Repulsion per area of one gap: quadratic from the reach to half of it, then logarithmic, so that no force closes the gap.
 /// Twice continuously differentiable.

@@ -4,6 +4,7 @@
 #include "toile/base/fields.h"
 #include "toile/base/result.h"
 #include "toile/dynamics/constraints.h"
+#include "toile/mechanics/particle.h"
 #include "toile/mesh/garment_mesh.h"
 #include "toile/mesh/support_mesh.h"
 
@@ -14,9 +15,18 @@
 namespace toile::dynamics {
 
 enum class Mode { equilibrium, motion };
+enum class Model { woven, particle };
+enum class Integrator { implicit, provot };
 
 struct SimulationParams {
   Mode mode = Mode::equilibrium;
+  Model model = Model::woven;
+  mechanics::EdgeEstimate edge_estimate = mechanics::EdgeEstimate::van_gelder;
+  mechanics::Modulus modulus = mechanics::Modulus::secant;
+  Integrator integrator = Integrator::implicit;
+  std::optional<double> explicit_step;
+  std::optional<double> explicit_damping;
+  double settling_time = 5;
   double gravity = 9.81;
   std::array<double, 3> gravity_direction{0, -1, 0};
   std::vector<double> gravity_times, gravity_factor;
@@ -47,6 +57,13 @@ struct SimulationParams {
 
   static void describe(auto& f) {
     f(&SimulationParams::mode, {.key = "mode", .doc = "equilibrium: until the garment hangs at rest; motion: for `duration` from the given velocities"});
+    f(&SimulationParams::model, {.key = "model", .doc = "woven: membrane of yarns and plate; particle: the published springs and torques, linear (docs/mechanics.md#particle)"});
+    f(&SimulationParams::edge_estimate, {.key = "edge_estimate", .doc = "model particle: springs on edges that are not along the yarns"});
+    f(&SimulationParams::modulus, {.key = "modulus", .doc = "model particle: slope of the tensile curve that its springs take; secant is the published one"});
+    f(&SimulationParams::integrator, {.key = "integrator", .doc = "implicit; provot: explicit, velocities then positions, constraints and contacts by dynamic constraints (docs/simulation.md#explicit-integration)"});
+    f(&SimulationParams::explicit_step, {.key = "explicit_step", .doc = "integrator provot: time step; not given: two fifths of the step that is certainly stable", .unit = "s", .min = 1e-9, .max = 1});
+    f(&SimulationParams::explicit_damping, {.key = "explicit_damping", .doc = "integrator provot: force against velocity per mass; not given: 10/s in equilibrium, none in motion", .unit = "1/s", .min = 0, .max = 1e5});
+    f(&SimulationParams::settling_time, {.key = "settling_time", .doc = "integrator provot, equilibrium: simulated time after the last row of a path, load or gravity table, after which the run ends unconverged (exit code 5)", .unit = "s", .min = 1e-6, .max = 1e4});
     f(&SimulationParams::gravity, {.key = "gravity", .doc = "acceleration of gravity", .unit = "m/s2", .min = 0, .max = 100});
     f(&SimulationParams::gravity_direction, {.key = "gravity_direction", .doc = "where gravity pulls to"});
     f(&SimulationParams::gravity_times, {.key = "gravity_times", .doc = "times of the rows of `gravity_factor`, increasing", .unit = "s"});
@@ -86,6 +103,14 @@ struct SimulationParams {
         }
       };
       table("gravity_factor", p.gravity_times, p.gravity_factor);
+      const auto bad = [&](const char* item, const char* what, const char* remedy) { issues.push_back({"bad_combination", {.item = item}, what, remedy}); };
+      if (p.integrator == Integrator::provot && p.increments > 1) bad("increments", "integrator provot runs through paths and loads in one piece", "leave increments at 1");
+      for (const ConstraintSpec& c : p.constraints) {
+        if (c.kind == Hold::clamp && (p.model == Model::particle || p.integrator == Integrator::provot)) {
+          bad("constraints", "kind clamp holds tangent planes, which only model woven with the implicit integrator has", "hold two rows of particles with kind pin and a region");
+        }
+        if (c.kind == Hold::slide && p.integrator == Integrator::provot) bad("constraints", "integrator provot holds whole positions only", "use kind pin or drive, or the implicit integrator");
+      }
       if (!(p.gravity_direction[0] != 0 || p.gravity_direction[1] != 0 || p.gravity_direction[2] != 0)) issues.push_back({"bad_direction", {.item = "gravity_direction"}, "a direction has no length", "give another vector"});
     });
   }
@@ -140,4 +165,21 @@ Result<SimulationOutcome> simulate(const mesh::GarmentMesh& garment, const std::
 template <>
 struct toile::Choices<toile::dynamics::Mode> {
   static constexpr std::array names{std::pair{"equilibrium", toile::dynamics::Mode::equilibrium}, std::pair{"motion", toile::dynamics::Mode::motion}};
+};
+
+template <>
+struct toile::Choices<toile::dynamics::Model> {
+  static constexpr std::array names{std::pair{"woven", toile::dynamics::Model::woven}, std::pair{"particle", toile::dynamics::Model::particle}};
+};
+template <>
+struct toile::Choices<toile::dynamics::Integrator> {
+  static constexpr std::array names{std::pair{"implicit", toile::dynamics::Integrator::implicit}, std::pair{"provot", toile::dynamics::Integrator::provot}};
+};
+template <>
+struct toile::Choices<toile::mechanics::EdgeEstimate> {
+  static constexpr std::array names{std::pair{"van_gelder", toile::mechanics::EdgeEstimate::van_gelder}, std::pair{"orthotropic", toile::mechanics::EdgeEstimate::orthotropic}};
+};
+template <>
+struct toile::Choices<toile::mechanics::Modulus> {
+  static constexpr std::array names{std::pair{"secant", toile::mechanics::Modulus::secant}, std::pair{"initial", toile::mechanics::Modulus::initial}};
 };
