@@ -47,6 +47,46 @@ int at(const mesh::GarmentMesh& g, int panel, int columns, int i, int j) {
   return 0;
 }
 
+constexpr int kAround = 90;
+
+// 0.4 m high about the y axis, rows of 50 mm; radius [m] of a height.
+template <class Radius>
+mesh::SupportMesh round_support(const Radius& radius) {
+  constexpr int rows = 8;
+  mesh::SupportMesh support;
+  support.x.resize(kAround * (rows + 1) + 2, 3);
+  std::vector<std::array<int, 3>> faces;
+  for (int j = 0; j <= rows; ++j) {
+    const double y = 0.05 * j, r = radius(y);
+    for (int i = 0; i < kAround; ++i) {
+      const double angle = 2 * std::numbers::pi * i / kAround;
+      support.x.row(j * kAround + i) << r * std::sin(angle), y, r * std::cos(angle);
+      const int a = j * kAround + i, b = j * kAround + (i + 1) % kAround;
+      if (j < rows) faces.insert(faces.end(), {{a, b, b + kAround}, {a, b + kAround, a + kAround}});
+      if (j == 0) faces.push_back({kAround * (rows + 1), b, a});
+      if (j == rows) faces.push_back({kAround * (rows + 1) + 1, a, b});
+    }
+  }
+  support.x.row(kAround * (rows + 1)) << 0, 0, 0;
+  support.x.row(kAround * (rows + 1) + 1) << 0, 0.05 * rows, 0;
+  support.faces.resize(static_cast<Eigen::Index>(faces.size()), 3);
+  for (std::size_t f = 0; f < faces.size(); ++f) support.faces.row(static_cast<Eigen::Index>(f)) << faces[f][0], faces[f][1], faces[f][2];
+  support.face_region = mesh::Ids::Constant(support.faces.rows(), -1);
+  return support;
+}
+
+// Regions "before" and "behind".
+mesh::SupportMesh two_regions() {
+  mesh::SupportMesh support = round_support([](double) { return 0.18; });
+  support.region_names = {"before", "behind"};
+  for (Eigen::Index f = 0; f < support.faces.rows(); ++f) {
+    double z = 0;
+    for (int k = 0; k < 3; ++k) z += support.x(support.faces(f, k), 2);
+    support.face_region[f] = z > 0 ? 0 : 1;
+  }
+  return support;
+}
+
 int add_seam(mesh::GarmentMesh& g, const std::string& name) {
   const int id = static_cast<int>(g.seams.size());
   g.seams.push_back({.id = id, .name = name});
@@ -529,27 +569,8 @@ TEST(place, long_sleeves_go_over_bent_elbows) {
 TEST(place, panels_on_true_cones_and_cylinders_keep_all_lengths_on_the_surface) {
   for (const double slope : {-0.3, 0.2, 0.0}) {
     SCOPED_TRACE(slope);
-    constexpr int around = 90, rows = 8;
     const double low = 0.18 + std::max(0.0, -slope) * 0.1;
-    mesh::SupportMesh support;
-    support.x.resize(around * (rows + 1) + 2, 3);
-    std::vector<std::array<int, 3>> faces;
-    for (int j = 0; j <= rows; ++j) {
-      const double y = 0.05 * j, r = low + slope * y;
-      for (int i = 0; i < around; ++i) {
-        const double angle = 2 * std::numbers::pi * i / around;
-        support.x.row(j * around + i) << r * std::sin(angle), y, r * std::cos(angle);
-        const int a = j * around + i, b = j * around + (i + 1) % around;
-        if (j < rows) faces.insert(faces.end(), {{a, b, b + around}, {a, b + around, a + around}});
-        if (j == 0) faces.push_back({around * (rows + 1), b, a});
-        if (j == rows) faces.push_back({around * (rows + 1) + 1, a, b});
-      }
-    }
-    support.x.row(around * (rows + 1)) << 0, 0, 0;
-    support.x.row(around * (rows + 1) + 1) << 0, 0.05 * rows, 0;
-    support.faces.resize(static_cast<Eigen::Index>(faces.size()), 3);
-    for (std::size_t f = 0; f < faces.size(); ++f) support.faces.row(static_cast<Eigen::Index>(f)) << faces[f][0], faces[f][1], faces[f][2];
-    support.face_region = mesh::Ids::Constant(support.faces.rows(), -1);
+    const mesh::SupportMesh support = round_support([&](double y) { return low + slope * y; });
     mesh::GarmentMesh g;
     add_rectangle(g, "square", 10, 10, 0.016);
     PlaceParams params;
@@ -571,6 +592,53 @@ TEST(place, panels_on_true_cones_and_cylinders_keep_all_lengths_on_the_surface) 
     }
     EXPECT_NEAR(placed->report.smallest_gap, 0.002, 2e-4);
     EXPECT_LE(placed->report.max_strain, std::pow(0.016 * std::sqrt(2) / 0.09, 2) / 24);
+  }
+}
+
+TEST(place, a_tube_keeps_another_distance_over_each_region) {
+  const auto support = two_regions();
+  const auto g = tube(30, 8);  // 1.2 m round
+  PlaceParams params;
+  params.offset = 0.002;
+  params.offsets = {{"before", 0.003}, {"behind", 0.012}};
+  const auto placed = place(g, support, params);
+  ASSERT_TRUE(placed.has_value()) << to_string(placed.issues().front());
+  for (const Issue& finding : placed->findings) ADD_FAILURE() << to_string(finding);
+  double before = 1, behind = 1;
+  for (Eigen::Index v = 0; v < g.vertex_count(); ++v) {
+    double& least = placed->garment.x(v, 2) > 0 ? before : behind;
+    least = std::min(least, placed->report.vertex_gap[static_cast<std::size_t>(v)]);
+  }
+  EXPECT_NEAR(before, 0.003, 2e-4);
+  EXPECT_NEAR(behind, 0.012, 2e-4);
+}
+
+TEST(place, rolled_cloth_too_near_to_a_region_is_moved_off_it) {
+  const auto support = two_regions();
+  mesh::GarmentMesh g;
+  add_rectangle(g, "square", 10, 10, 0.016);
+  PlaceParams params;
+  params.offset = 0.002;
+  params.panels["square"] = {.region = Region::torso, .point = "top", .to = {0, 0.3, 0.18}};
+  params.offsets = {{"behind", 0.012}};
+  const auto as_rolled = place(g, support, params);
+  params.offsets = {{"before", 0.012}};
+  const auto moved = place(g, support, params);
+  ASSERT_TRUE(as_rolled.has_value() && moved.has_value());
+  EXPECT_NEAR(as_rolled->report.smallest_gap, 0.002, 2e-4);
+  EXPECT_NEAR(moved->report.smallest_gap, 0.012, 2e-4);
+  EXPECT_TRUE(moved->findings.empty());
+}
+
+TEST(place, an_offset_over_no_region_names_the_regions) {
+  PlaceParams params;
+  params.offsets = {{"befor", 0.003}, {"above", 0.003}};
+  const auto g = tube(30, 8);
+  const auto support = two_regions();
+  for (const auto& placed : {place(g, support, params), place_from(g, g.x, support, params)}) {
+    ASSERT_FALSE(placed.has_value());
+    EXPECT_EQ(codes(placed.issues()), (std::vector<std::string>{"unknown_region", "unknown_region"}));
+    EXPECT_NE(placed.issues().front().what.find("before, behind"), std::string::npos);
   }
 }
 

@@ -1,5 +1,6 @@
 #include "toile/placement/place.h"
 
+#include "toile/base/text.h"
 #include "toile/contact/exact.h"
 #include "toile/contact/support_field.h"
 #include "toile/contact/untangle.h"
@@ -13,6 +14,7 @@
 #include "toile/placement/subset.h"
 
 #include <Eigen/Geometry>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -34,6 +36,7 @@ constexpr double kSleeveGap = 0.004;       // between a sleeve and the trunk's p
 constexpr double kLevel = 3;              // of edge lengths from one mesh to the next
 constexpr double kRound = 0.005;          // sections of a cone leave their circle, and circles their cone, by this part of the radius at most
 constexpr double kUpright = 0.001;        // a cone's slope under which it is a cylinder
+constexpr double kNearly = 1e-4;           // cloth that is so much too near to a region stays as it is rolled [m]
 constexpr double kSheet = 0.004;           // between sheets that lie on one another at the start [m]
 
 double polygon_perimeter(const Points2& p) {
@@ -559,9 +562,54 @@ void conclude(Placed& placed, const mesh::SupportMesh& support, const PlaceParam
   }
 }
 
-RelaxOptions relax_options(const PlaceParams& params) {
+// Wanted distance by face; empty where it is the same everywhere.
+Result<std::vector<double>> face_offsets(const mesh::SupportMesh& support, const PlaceParams& params) {
+  std::vector<double> result;
+  if (params.offsets.empty()) return result;
+  std::vector<double> by_region(support.region_names.size(), params.offset);
+  Issues issues;
+  for (const auto& [name, offset] : params.offsets) {
+    const auto it = std::find(support.region_names.begin(), support.region_names.end(), name);
+    if (it != support.region_names.end()) {
+      by_region[static_cast<std::size_t>(it - support.region_names.begin())] = offset;
+      continue;
+    }
+    issues.push_back({.code = "unknown_region", .place = {.item = "offsets." + name},
+                      .what = support.region_names.empty() ? std::string("the support has no named regions")
+                                                           : fmt::format("the support has no region of this name; it has {}", fmt::join(support.region_names, ", ")),
+                      .remedy = support.region_names.empty() ? std::string("use `offset` alone, or a support with regions (docs/form.md)") : suggestion(name, support.region_names),
+                      .category = Category::input});
+  }
+  if (!issues.empty()) return issues;
+  result.reserve(static_cast<std::size_t>(support.faces.rows()));
+  for (Eigen::Index f = 0; f < support.faces.rows(); ++f) {
+    const int region = support.face_region[f];
+    result.push_back(region < 0 ? params.offset : by_region[static_cast<std::size_t>(region)]);
+  }
+  return result;
+}
+
+// Over faces with an offset of their own: the largest that a vertex falls short of, 0 if none does.
+double missed_offset(const Points3& x, const mesh::SupportMesh& support, const RelaxOptions& options) {
+  if (options.face_offsets.empty()) return 0;
+  const contact::Surface body = contact::make_surface(static_cast<int>(support.x.rows()), support.faces);
+  const contact::SupportField field(body, support.x);
+  std::vector<contact::SurfacePoint> near;
+  std::vector<int> warm;
+  field.nearest(x, *std::max_element(options.face_offsets.begin(), options.face_offsets.end()), near, warm);
+  double missed = 0;
+  for (const contact::SurfacePoint& p : near) {
+    if (p.face < 0) continue;
+    const double offset = options.face_offsets[static_cast<std::size_t>(p.face)];
+    if (offset != options.offset && p.distance < offset - kNearly) missed = std::max(missed, offset);
+  }
+  return missed;
+}
+
+Result<RelaxOptions> relax_options(const mesh::SupportMesh& support, const PlaceParams& params) {
   RelaxOptions options;
   options.offset = params.offset;
+  TOILE_TRY(options.face_offsets, face_offsets(support, params));
   options.clearance = params.clearance;
   options.thickness = params.thickness;
   options.closing_steps = params.closing_steps;
@@ -581,7 +629,7 @@ Result<Placed> place_on_frame(const mesh::GarmentMesh& garment, const mesh::Supp
   placed.garment = garment;
   TOILE_TRY(placed.lines, held_lines(garment, frame, params.curves, params.lines));
   TOILE_TRY(const Points3 start, spread(garment, placed.lines, params.thickness));
-  RelaxOptions options = relax_options(params);
+  TOILE_TRY(RelaxOptions options, relax_options(frame, params));
   options.closing_steps = options.swelling_steps = 0;
   options.progress = progress;
   for (const HeldLine& line : placed.lines) options.targets.insert(options.targets.end(), line.targets.begin(), line.targets.end());
@@ -616,11 +664,17 @@ Result<Placed> place_as_given(const mesh::GarmentMesh& sewn, const mesh::Support
   }
   const std::vector<int> stuck = stuck_folds(sewn);
   const mesh::GarmentMesh garment = without_folds(sewn, stuck);
+  TOILE_TRY(RelaxOptions options, relax_options(support, params));
   TOILE_TRY(const BodyFrame frame, body_frame(support));
   const FoldedFlat folded_flat = fold_flat(garment);
   TOILE_TRY(const Layout layout, make_layout(garment, folded_flat, support, frame, params));
-  TOILE_TRY(const Start start, bend(garment, folded_flat, frame, layout, params));
-  RelaxOptions options = relax_options(params);
+  TOILE_TRY(Start start, bend(garment, folded_flat, frame, layout, params));
+  if (const double missed = loose(garment) ? missed_offset(start.x, support, options) : 0; missed > 0) {
+    // What nothing holds stays as it is rolled: at once far enough out for every region that it lies over.
+    PlaceParams farther = params;
+    farther.offset = std::max(params.offset, missed);
+    TOILE_TRY(start, bend(garment, folded_flat, frame, layout, farther));
+  }
   options.flattening = start.flattening;
   Placed placed;
   placed.garment = sewn;
@@ -663,7 +717,7 @@ Result<Placed> place_as_given(const mesh::GarmentMesh& sewn, const mesh::Support
     mesh::GarmentMesh bent = garment;
     bent.x = start.x;
     const Report report = measure(bent, support);
-    return report.smallest_gap >= params.clearance && report.self_intersections.empty() && report.support_intersections.empty();
+    return report.smallest_gap >= params.clearance && missed_offset(start.x, support, options) == 0 && report.self_intersections.empty() && report.support_intersections.empty();
   };
   // From the coarsest mesh to the given one, each about a third as fine as the next.
   std::vector<double> sizes;
@@ -732,7 +786,7 @@ Result<Placed> place(const mesh::GarmentMesh& sewn, const mesh::SupportMesh& sup
 namespace {
 
 /// What lies in the support, or nearer to it than `offset`, is lifted off it along the support's smooth normals.
-Points3 lifted(const Points3& x, const mesh::SupportMesh& support, double offset) {
+Points3 lifted(const Points3& x, const mesh::SupportMesh& support, const RelaxOptions& options) {
   Points3 normals = Points3::Zero(support.x.rows(), 3);
   for (Eigen::Index f = 0; f < support.faces.rows(); ++f) {
     const Vector3d a = support.x.row(support.faces(f, 0)), b = support.x.row(support.faces(f, 1)), c = support.x.row(support.faces(f, 2));
@@ -743,11 +797,15 @@ Points3 lifted(const Points3& x, const mesh::SupportMesh& support, double offset
   const contact::SupportField field(body, support.x);
   std::vector<contact::SurfacePoint> near;
   std::vector<int> warm;
-  field.nearest(x, 2 * offset, near, warm);
+  double farthest = options.offset;
+  for (const double offset : options.face_offsets) farthest = std::max(farthest, offset);
+  field.nearest(x, 2 * farthest, near, warm);
   Points3 result = x;
   for (Eigen::Index v = 0; v < x.rows(); ++v) {
     const contact::SurfacePoint& p = near[static_cast<std::size_t>(v)];
-    if (p.face < 0 || p.distance >= offset) continue;
+    if (p.face < 0) continue;
+    const double offset = options.face_offsets.empty() ? options.offset : options.face_offsets[static_cast<std::size_t>(p.face)];
+    if (p.distance >= offset) continue;
     Vector3d normal = Vector3d::Zero();
     for (int k = 0; k < 3; ++k) normal += p.weight[static_cast<std::size_t>(k)] * normals.row(support.faces(p.face, k)).transpose();
     result.row(v) = (p.point + offset * normal.normalized()).transpose();
@@ -757,11 +815,11 @@ Points3 lifted(const Points3& x, const mesh::SupportMesh& support, double offset
 
 }  // namespace
 
-Placed place_from(const mesh::GarmentMesh& sewn, const Points3& start, const mesh::SupportMesh& support, const PlaceParams& params, const std::function<void(double)>& progress) {
-  RelaxOptions options = relax_options(params);
+Result<Placed> place_from(const mesh::GarmentMesh& sewn, const Points3& start, const mesh::SupportMesh& support, const PlaceParams& params, const std::function<void(double)>& progress) {
+  TOILE_TRY(RelaxOptions options, relax_options(support, params));
   options.closing_steps = options.swelling_steps = 0;
   options.settling_steps = params.fine_steps;
-  const Points3 x = lifted(start, support, params.offset);
+  const Points3 x = lifted(start, support, options);
   options.rolled = x;
   options.progress = progress;
   Placed placed;

@@ -68,6 +68,7 @@ struct Guard {
 
 struct Wall {
   Vector3d point, normal;
+  double offset = 0;               // wanted distance [m]
   bool active = false;
   bool known = false;              // searched for at all
   Vector3d at = Vector3d::Zero();  // where it was searched from
@@ -389,6 +390,7 @@ class Relaxation {
       if (!wall.active) return;
       wall.point = flattening.flattened(p.point);
       wall.normal = flattening.flattened_normal(p.normal, p.point);
+      wall.offset = options_.face_offsets.empty() ? options_.offset : options_.face_offsets[static_cast<std::size_t>(p.face)];
     });
   }
 
@@ -418,7 +420,7 @@ class Relaxation {
     const Wall& wall = walls_[vertex];
     if (!wall.active) return;
     const auto row = static_cast<Eigen::Index>(vertex);
-    const double gap = (x_.row(row) - wall.point.transpose()).dot(wall.normal.transpose()) - options_.offset;
+    const double gap = (x_.row(row) - wall.point.transpose()).dot(wall.normal.transpose()) - wall.offset;
     if (gap < 0) x_.row(row) -= gap * wall.normal.transpose();
   }
 

@@ -70,6 +70,7 @@ struct PanelSpec {
 
 struct PlaceParams {
   double offset = 0.004;
+  std::map<std::string, double> offsets;
   double clearance = 0.0015;
   double max_strain = 0.005;
   double rms_strain = 0.001;
@@ -90,6 +91,7 @@ struct PlaceParams {
   double line_tolerance = 0.02;
   static void describe(auto& f) {
     f(&PlaceParams::offset, {.key = "offset", .doc = "wanted distance of the cloth from the support", .unit = "m", .min = 0, .max = 0.2});
+    f(&PlaceParams::offsets, {.key = "offsets", .doc = "instead of `offset` over named regions of the support, such as torso, neck or arm_left", .unit = "m", .min = 0, .max = 0.2});
     f(&PlaceParams::clearance, {.key = "clearance", .doc = "smallest distance of a cloth vertex from the support at the end", .unit = "m", .min = 1e-4, .max = 0.1});
     f(&PlaceParams::max_strain, {.key = "max_strain", .doc = "a larger edge strain is a finding", .unit = "1", .min = 1e-6, .max = 0.5});
     f(&PlaceParams::rms_strain, {.key = "rms_strain", .doc = "a larger root mean square of the edge strains is a finding", .unit = "1", .min = 1e-6, .max = 0.5});
@@ -111,6 +113,11 @@ struct PlaceParams {
     f.check([](const PlaceParams& p, Issues& issues) {
       if (p.clearance > p.offset) {
         issues.push_back({.code = "bad_range", .place = {.item = "clearance"}, .what = "the clearance is larger than the offset",
+                          .remedy = "give an offset of at least the clearance"});
+      }
+      for (const auto& [name, offset] : p.offsets) {
+        if (offset >= p.clearance) continue;
+        issues.push_back({.code = "bad_range", .place = {.item = "offsets." + name}, .what = "the clearance is larger than the offset",
                           .remedy = "give an offset of at least the clearance"});
       }
     });

@@ -27,13 +27,14 @@ struct Placed {
 };
 
 /// With params.lines the garment is spread between curves of a frame (fit_up.h), otherwise laid round a body.
-/// error  what make_layout, held_lines and spread refuse; "too_narrow" for panels that cannot go round their part of the support
+/// error  what make_layout, held_lines and spread refuse; "unknown_region" for an offset over a region that the support does not have; "too_narrow" for panels that cannot go round their part of the support
 Result<Placed> place(const mesh::GarmentMesh& garment, const mesh::SupportMesh& support, const PlaceParams& params,
                      const std::function<void(double)>& progress = {});
 
 /// The relaxation alone, from given positions near the support: seams close and let go (`fine_steps`), stretch is taken out.
 /// start  [m], |V| x 3
-Placed place_from(const mesh::GarmentMesh& garment, const Points3& start, const mesh::SupportMesh& support, const PlaceParams& params,
+/// error  "unknown_region"
+Result<Placed> place_from(const mesh::GarmentMesh& garment, const Points3& start, const mesh::SupportMesh& support, const PlaceParams& params,
                   const std::function<void(double)>& progress = {});
 
 /// Panels bent around the flattened support, before the relaxation. The flattening is chosen where params leave it open.

@@ -17,6 +17,7 @@ using mesh::Points3;
 
 struct RelaxOptions {
   double offset = 0.004;       ///< wanted distance of vertices from the support [m]
+  std::vector<double> face_offsets;  ///< by face of the support, or empty: instead of `offset` where the closest point lies on it [m]
   double clearance = 0.0015;   ///< least distance of the middles of edges [m]
   double thickness = 0.001;    ///< wanted distance of panels from one another [m]
   Flattening flattening;       ///< of the support at the start
