@@ -21,7 +21,8 @@ Result<stage::ToolInfo> tools(const std::string& name) {
 class pipeline_plans : public testing::Test {
  protected:
   void SetUp() override {
-    folder = testing::TempDir() + "toile pipeline/";  // a path with a space, as people have them
+    // A path with a space, as people have them; one for each test, since they run side by side.
+    folder = testing::TempDir() + "toile pipeline " + testing::UnitTest::GetInstance()->current_test_info()->name() + "/";
     fs::remove_all(folder);
     fs::create_directories(folder);
     for (const char* file : {"pattern.yaml", "seams.yaml", "card.yaml"}) ASSERT_TRUE(io::write_file(folder + file, "").empty());
