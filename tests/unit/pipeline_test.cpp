@@ -22,7 +22,7 @@ class pipeline_plans : public testing::Test {
  protected:
   void SetUp() override {
     // A path with a space, as people have them; one for each test, since they run side by side.
-    folder = testing::TempDir() + "toile pipeline " + testing::UnitTest::GetInstance()->current_test_info()->name() + "/";
+    folder = testing::TempDir() + "toile_" + testing::UnitTest::GetInstance()->current_test_info()->name() + "/toile pipeline/";
     fs::remove_all(folder);
     fs::create_directories(folder);
     for (const char* file : {"pattern.yaml", "seams.yaml", "card.yaml"}) ASSERT_TRUE(io::write_file(folder + file, "").empty());
