@@ -10,6 +10,15 @@ namespace {
 
 using namespace toile;
 
+const char* name_of(placement::Part part) {
+  switch (part) {
+    case placement::Part::arm_left: return "arm_left";
+    case placement::Part::arm_right: return "arm_right";
+    case placement::Part::attached: return "attached";
+    default: return "trunk";
+  }
+}
+
 double degrees(double angle) { return angle * 180 / std::numbers::pi; }
 
 struct PlaceStage {
@@ -66,6 +75,10 @@ struct PlaceStage {
       const std::string& name = garment.panels[static_cast<std::size_t>(angle.panel)].name;
       run.report("mean_warp_angle_" + name, degrees(angle.mean), "deg");
       run.report("max_warp_angle_" + name, degrees(angle.largest), "deg");
+    }
+    for (const placement::PartFit& fit : report.fits) {
+      run.report(fmt::format("fit_{}_rms", name_of(fit.part)), fit.rms, "m");
+      run.report(fmt::format("fit_{}_max", name_of(fit.part)), fit.largest, "m");
     }
     for (const placement::SeamGap& seam : report.seams) {
       const std::string& name = garment.seams[static_cast<std::size_t>(seam.seam)].name;

@@ -630,6 +630,42 @@ TEST(place, rolled_cloth_too_near_to_a_region_is_moved_off_it) {
   EXPECT_TRUE(moved->findings.empty());
 }
 
+TEST(place, the_fit_of_the_surface_that_panels_were_bent_on_is_reported) {
+  PlaceParams params;
+  params.panels["front"] = {.region = Region::torso_front, .point = "top", .to = {0, 0.3, 0.18}};
+  const auto placed = place(tube(30, 8), two_regions(), params);
+  ASSERT_TRUE(placed.has_value());
+  ASSERT_EQ(placed->report.fits.size(), 1u);
+  EXPECT_EQ(placed->report.fits[0].part, Part::trunk);
+  // 1.2 m of cloth, and 6 mm at each seam where the panels start apart
+  EXPECT_NEAR(placed->report.fits[0].rms, 1.212 / (2 * std::numbers::pi) - 0.18, 2e-4);
+  EXPECT_NEAR(placed->report.fits[0].largest, placed->report.fits[0].rms, 2e-4);
+}
+
+TEST(place, a_panel_over_a_cylinder_and_the_cone_on_it_keeps_its_lengths) {
+  auto support = round_support([](double y) { return 0.16 + 0.2 * std::max(0.0, y - 0.2); });
+  support.region_names = {"cylinder", "cone"};
+  for (Eigen::Index f = 0; f < support.faces.rows(); ++f) {
+    double y = 0;
+    for (int k = 0; k < 3; ++k) y += support.x(support.faces(f, k), 1) / 3;
+    support.face_region[f] = y < 0.2 ? 0 : 1;
+  }
+  PlaceParams params;
+  params.offset = 0.002;
+  params.offsets = {{"cone", 0.003}};
+  params.panels["square"] = {.region = Region::torso, .point = "top", .to = {0, 0.3, 0.18}};
+  mesh::GarmentMesh g;
+  add_rectangle(g, "square", 10, 10, 0.02);
+  const auto placed = place(g, support, params);
+  ASSERT_TRUE(placed.has_value()) << to_string(placed.issues().front());
+  for (const Issue& finding : placed->findings) ADD_FAILURE() << to_string(finding);
+  EXPECT_LT(placed->garment.x.col(1).minCoeff(), 0.15);  // over both
+  EXPECT_GT(placed->garment.x.col(1).maxCoeff(), 0.25);
+  EXPECT_LE(placed->report.max_strain, 0.001);
+  EXPECT_LE(placed->report.rms_strain, 0.0005);
+  EXPECT_NEAR(placed->report.smallest_gap, 0.003, 2e-4);
+}
+
 TEST(place, an_offset_over_no_region_names_the_regions) {
   PlaceParams params;
   params.offsets = {{"befor", 0.003}, {"above", 0.003}};

@@ -41,6 +41,14 @@ mesh::SupportMesh mirrored(const mesh::SupportMesh& support) {
   return m;
 }
 
+Part mirrored(Part part) {
+  switch (part) {
+    case Part::arm_left: return Part::arm_right;
+    case Part::arm_right: return Part::arm_left;
+    default: return part;
+  }
+}
+
 PlaceParams mirrored(const PlaceParams& params) {
   PlaceParams m = params;
   for (auto& [name, panel] : m.panels) {

@@ -764,6 +764,7 @@ Result<Placed> place_as_given(const mesh::GarmentMesh& sewn, const mesh::Support
   }
   placed.garment.x = x;
   conclude(placed, support, params, wanted_directions(garment, folded_flat, layout, start.x));
+  placed.report.fits = fit_of_parts(garment, layout, start.x, support, start.flattening);
   return placed;
 }
 
@@ -779,6 +780,8 @@ Result<Placed> place(const mesh::GarmentMesh& sewn, const mesh::SupportMesh& sup
   placed.garment = sewn;
   placed.garment.x = x;
   for (double& angle : placed.report.face_warp_angle) angle = -angle;
+  for (PartFit& fit : placed.report.fits) fit.part = mirrored(fit.part);
+  std::sort(placed.report.fits.begin(), placed.report.fits.end(), [](const PartFit& a, const PartFit& b) { return a.part < b.part; });
   add_columns(placed.garment, placed.report);
   return placed;
 }

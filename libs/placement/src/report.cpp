@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 namespace toile::placement {
 
@@ -153,6 +154,32 @@ Report measure(const mesh::GarmentMesh& garment, const mesh::SupportMesh& suppor
   for (const auto& pair : report.self_intersections) report.face_cut[static_cast<std::size_t>(pair.a)] = report.face_cut[static_cast<std::size_t>(pair.b)] = 1;
   for (const auto& pair : report.support_intersections) report.face_cut[static_cast<std::size_t>(pair.a)] |= 2;
   return report;
+}
+
+std::vector<PartFit> fit_of_parts(const mesh::GarmentMesh& garment, const Layout& layout, const Points3& bent, const mesh::SupportMesh& support, const Flattening& flattening) {
+  Points3 flat = support.x;
+  for (Eigen::Index v = 0; v < flat.rows(); ++v) flat.row(v) = flattening.flattened(support.x.row(v).transpose()).transpose();
+  const contact::SupportField field(contact::make_surface(static_cast<int>(flat.rows()), support.faces), flat);
+  std::vector<contact::SurfacePoint> near;
+  std::vector<int> warm;
+  field.nearest(bent, kReach, near, warm);
+  std::map<Part, PartFit> fits;
+  std::map<Part, int> counts;
+  for (std::size_t v = 0; v < near.size(); ++v) {
+    const Part part = layout.panels[static_cast<std::size_t>(garment.vertex_panel[static_cast<Eigen::Index>(v)])].part;
+    if (part == Part::attached) continue;
+    PartFit& fit = fits[part];
+    fit.part = part;
+    fit.rms += near[v].distance * near[v].distance;
+    fit.largest = std::max(fit.largest, std::abs(near[v].distance));
+    ++counts[part];
+  }
+  std::vector<PartFit> result;
+  for (auto& [part, fit] : fits) {
+    fit.rms = std::sqrt(fit.rms / counts[part]);
+    result.push_back(fit);
+  }
+  return result;
 }
 
 void add_columns(mesh::GarmentMesh& garment, const Report& report) {

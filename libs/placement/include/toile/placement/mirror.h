@@ -3,6 +3,7 @@
 
 #include "toile/mesh/garment_mesh.h"
 #include "toile/mesh/support_mesh.h"
+#include "toile/placement/layout.h"
 #include "toile/placement/params.h"
 
 namespace toile::placement {
@@ -12,6 +13,7 @@ namespace toile::placement {
 mesh::GarmentMesh mirrored(const mesh::GarmentMesh& garment);
 /// Vertex and face numbers and all names stay.
 mesh::SupportMesh mirrored(const mesh::SupportMesh& support);
+Part mirrored(Part part);
 /// Left and right regions exchanged, shifts and turns reversed.
 PlaceParams mirrored(const PlaceParams& params);
 

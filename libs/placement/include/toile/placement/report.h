@@ -5,6 +5,7 @@
 #include "toile/mesh/garment_mesh.h"
 #include "toile/mesh/support_mesh.h"
 #include "toile/placement/body_frame.h"
+#include "toile/placement/flatten.h"
 #include "toile/placement/folds.h"
 #include "toile/placement/layout.h"
 
@@ -24,6 +25,12 @@ struct WarpAngle {
   double mean = 0, largest = 0;  ///< absolute, mean by area [rad]
 };
 
+/// How far the support lies from the surface that a part's panels were bent on, at their vertices.
+struct PartFit {
+  Part part = Part::trunk;
+  double rms = 0, largest = 0;  ///< [m]
+};
+
 struct Report {
   double max_strain = 0, rms_strain = 0;  ///< of all edges [1]
   double area_change = 0;                 ///< placed over flat area, minus 1
@@ -35,6 +42,7 @@ struct Report {
   std::vector<SeamGap> seams;
   double mean_warp_angle = 0, largest_warp_angle = 0;  ///< [rad]
   std::vector<WarpAngle> warp_angles;  ///< of panels that have a wanted direction
+  std::vector<PartFit> fits;  ///< of the parts that panels were bent round; place() fills them in
   // by vertex
   std::vector<double> vertex_gap;     ///< from the support, negative inside [m]
   std::vector<double> vertex_strain;  ///< of the edge at the vertex with the largest one, signed [1]
@@ -58,6 +66,10 @@ std::vector<std::optional<WantedDirection>> wanted_directions(const mesh::Garmen
 
 /// wanted  |F|, or empty: no directions are measured.
 Report measure(const mesh::GarmentMesh& garment, const mesh::SupportMesh& support, const std::vector<std::optional<WantedDirection>>& wanted = {});
+
+/// The surfaces that panels were bent on against the (flattened) support. Parts that no panel is on, and attached panels, have no fit.
+/// bent  the panels bent round their parts [m], |V| x 3
+std::vector<PartFit> fit_of_parts(const mesh::GarmentMesh& garment, const Layout& layout, const Points3& bent, const mesh::SupportMesh& support, const Flattening& flattening);
 
 /// Columns of the file: vertex edge_strain, ease, seam_gap; face warp_angle, cuts.
 void add_columns(mesh::GarmentMesh& garment, const Report& report);
