@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <string>
 
+#include "results.h"
 #include "toile/form/form.h"
 #include "toile/io/fabric_yaml.h"
 #include "toile/io/file.h"
@@ -17,14 +18,9 @@
 #include "toile/tailor/sew.h"
 
 using namespace toile;
+using test::checked;
 
 namespace {
-
-template <class T>
-T checked(Result<T> result) {
-  if (!result) throw std::runtime_error(to_string(result.issues().front()));
-  return std::move(*result);
-}
 
 std::string source(const std::string& name) { return checked(io::read_file(std::string(TOILE_SOURCE_DIR) + "/" + name)); }
 

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "results.h"
 #include "toile/dynamics/simulate.h"
 #include "toile/io/fabric_yaml.h"
 #include "toile/io/file.h"
@@ -22,14 +23,9 @@
 #include "toile/tailor/sew.h"
 
 using namespace toile;
+using test::checked;
 
 namespace {
-
-template <class T>
-T checked(Result<T> result) {
-  if (!result) throw std::runtime_error(to_string(result.issues().front()));
-  return std::move(*result);
-}
 
 struct Corner {
   std::string name;

@@ -8,6 +8,7 @@
 #include <map>
 #include <string>
 
+#include "results.h"
 #include "toile/base/rng.h"
 #include "toile/io/fabric_yaml.h"
 #include "toile/io/file.h"
@@ -22,14 +23,9 @@
 #include "toile/tailor/trim.h"
 
 using namespace toile;
+using test::checked;
 
 namespace {
-
-template <class T>
-T checked(Result<T> result) {
-  if (!result) throw std::runtime_error(to_string(result.issues().front()));
-  return std::move(*result);
-}
 
 std::string source(const std::string& name) { return checked(io::read_file(std::string(TOILE_SOURCE_DIR) + "/" + name)); }
 

@@ -1,3 +1,4 @@
+#include "results.h"
 #include "toile/io/body_import.h"
 
 #include "toile/io/file.h"
@@ -12,6 +13,7 @@
 #include <functional>
 
 using namespace toile;
+using test::codes;
 
 namespace {
 
@@ -108,16 +110,6 @@ class Folder {
  private:
   std::filesystem::path path_;
 };
-
-std::string codes(const Result<io::ImportedBody>& result) {
-  std::string all;
-  if (result) return "";
-  for (const Issue& issue : result.issues()) {
-    all += (all.empty() ? "" : " ") + issue.code;
-    EXPECT_FALSE(issue.remedy.empty()) << to_string(issue);
-  }
-  return all;
-}
 
 }  // namespace
 

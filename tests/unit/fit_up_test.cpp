@@ -1,3 +1,4 @@
+#include "results.h"
 #include "toile/placement/fit_up.h"
 
 #include "garments.h"
@@ -12,6 +13,7 @@
 #include <numbers>
 
 using namespace toile;
+using test::codes;
 using namespace toile::placement;
 using Eigen::Vector3d;
 using test::add_rectangle;
@@ -39,16 +41,6 @@ FrameCurve arc(double radius, double half, double z, double y = 0, int pieces = 
 }
 
 double largest_strain(const mesh::GarmentMesh& garment, const Points3& x) { return edge_strain(garment, x).largest; }
-
-std::string codes(const auto& result) {
-  std::string all;
-  if (result) return "";
-  for (const Issue& issue : result.issues()) {
-    all += (all.empty() ? "" : " ") + issue.code;
-    EXPECT_FALSE(issue.remedy.empty()) << to_string(issue);
-  }
-  return all;
-}
 
 }  // namespace
 
@@ -161,6 +153,7 @@ TEST(fit_up, says_what_is_missing_all_at_once) {
   params.curves["rail"] = {{}, {"a", "b"}};
   params.lines = {{{"roof.left"}, "rail"}};
   EXPECT_EQ(codes(place(g, frame, params)), "not_held");
+  EXPECT_EQ(codes(place_from(g, g.x, frame, params)), "bad_combination");
   // A line five times as long as its curve cannot lie on it.
   mesh::GarmentMesh one;
   add_rectangle(one, "roof", 50, 4, 0.02);

@@ -819,6 +819,10 @@ Points3 lifted(const Points3& x, const mesh::SupportMesh& support, const RelaxOp
 }  // namespace
 
 Result<Placed> place_from(const mesh::GarmentMesh& sewn, const Points3& start, const mesh::SupportMesh& support, const PlaceParams& params, const std::function<void(double)>& progress) {
+  if (!params.lines.empty()) {
+    return Issue{.code = "bad_combination", .place = {.item = "lines"}, .what = "given positions and lines on curves both say where the garment begins",
+                 .remedy = "leave out one of them", .category = Category::input};
+  }
   TOILE_TRY(RelaxOptions options, relax_options(support, params));
   options.closing_steps = options.swelling_steps = 0;
   options.settling_steps = params.fine_steps;

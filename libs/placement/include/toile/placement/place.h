@@ -33,7 +33,7 @@ Result<Placed> place(const mesh::GarmentMesh& garment, const mesh::SupportMesh& 
 
 /// The relaxation alone, from given positions near the support: seams close and let go (`fine_steps`), stretch is taken out.
 /// start  [m], |V| x 3
-/// error  "unknown_region"
+/// error  "unknown_region"; "bad_combination" if params.lines says where it begins as well
 Result<Placed> place_from(const mesh::GarmentMesh& garment, const Points3& start, const mesh::SupportMesh& support, const PlaceParams& params,
                   const std::function<void(double)>& progress = {});
 
