@@ -1,28 +1,48 @@
 // Takes in a body made elsewhere.
 #include "toile/io/body_import.h"
+#include "toile/placement/segment.h"
 #include "toile/stage/stage.h"
+
+#include <Eigen/Geometry>
+#include <vector>
 
 namespace {
 
 using namespace toile;
+
+/// Area of each named region [m2].
+std::vector<double> region_areas(const mesh::SupportMesh& body) {
+  std::vector<double> areas(body.region_names.size(), 0.0);
+  for (Eigen::Index f = 0; f < body.faces.rows(); ++f) {
+    const Eigen::Vector3d a = body.x.row(body.faces(f, 0)), b = body.x.row(body.faces(f, 1)), c = body.x.row(body.faces(f, 2));
+    if (body.face_region[f] >= 0) areas[static_cast<std::size_t>(body.face_region[f])] += (b - a).cross(c - a).norm() / 2;
+  }
+  return areas;
+}
 
 struct BodyStage {
   using Params = io::BodyImportParams;
 
   static stage::Description description() {
     return {.name = "toile-body",
-            .version = 2,
+            .version = 3,
             .summary = "Takes in a body or another support from a mesh file (OBJ, STL, PLY, glTF and others).",
             .example = "toile-body scan.stl -o body.ply --unit mm --up z --facing -y",
             .details = "The result is in metres, y up, facing +z. Unit and axes are as stated, never guessed; an implausible size is an error that says "
                        "which unit would fit. Vertices of exactly equal position become one. The surface has to be closed, with all faces looking outward "
-                       "(or ask for winding: outward), unless wrap asks for a closed surface round it. Such a body has no landmarks and no regions.",
+                       "(or ask for winding: outward), unless wrap asks for a closed surface round it. Landmarks and regions are what "
+                       "`landmarks` and `regions` name; `segment: body` finds trunk, neck, arms and legs of what is left.",
             .inputs = {{.name = "body", .doc = "mesh file", .kind = stage::FileKind::any}},
             .output = stage::FileKind::support};
   }
 
   static Result<stage::Output> run(const Params& params, stage::Run& run) {
     TOILE_TRY(io::ImportedBody body, io::import_body(run.path("body"), params));
+    if (params.segment == io::Segmentation::body) {
+      Issues issues = placement::segment(body.mesh);
+      for (Issue& issue : issues) issue.place = {.file = run.path("body"), .item = "segment"};
+      if (!issues.empty()) return issues;
+    }
     run.report("vertices", static_cast<std::size_t>(body.mesh.x.rows()));
     run.report("faces", static_cast<std::size_t>(body.mesh.faces.rows()));
     run.report("joined_corners", body.joined_corners);
@@ -42,6 +62,8 @@ struct BodyStage {
     run.report("height", size[1], "m");
     run.report("depth", size[2], "m");
     run.report("volume", mesh::volume(body.mesh.x, body.mesh.faces), "m3");
+    const std::vector<double> areas = region_areas(body.mesh);
+    for (std::size_t i = 0; i < areas.size(); ++i) run.report("area_" + body.mesh.region_names[i], areas[i], "m2");
     stage::Output output;
     output.artefact = std::move(body.mesh);
     return output;

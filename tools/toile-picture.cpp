@@ -11,7 +11,7 @@ struct PictureStage {
 
   static stage::Description description() {
     return {.name = "toile-picture",
-            .version = 2,
+            .version = 3,
             .summary = "Draws a garment, a body or both and writes a PNG picture.",
             .example = "toile-picture draped.ply --support form.ply -o front.png --view front",
             .details = "The first file may be a garment or a support alone. docs/pictures.md says how colours, lines and light are made.",

@@ -351,3 +351,139 @@ TEST(body_import, a_wrap_takes_pieces_that_cross_and_faces_turned_inward) {
   EXPECT_NEAR(body->mesh.x.col(0).maxCoeff(), 0.25 + p.wrap_offset, 1e-4);
   EXPECT_TRUE(ok(mesh::validate(body->mesh)));
 }
+
+namespace {
+
+/// The box with each side cut into n x n squares; side k (as in the order of axes, low before high) is part k.
+struct FineBox {
+  mesh::Points3 x;
+  mesh::Triangles faces;
+  io::FaceMarks marks;
+  explicit FineBox(int n) {
+    const Eigen::Vector3d size(0.4, 1.6, 0.3);
+    std::vector<Eigen::Vector3d> points;
+    std::vector<std::array<int, 3>> triangles;
+    for (int axis = 0; axis < 3; ++axis) {
+      for (int high = 0; high < 2; ++high) {
+        const int u = (axis + 1) % 3, v = (axis + 2) % 3, base = static_cast<int>(points.size());
+        for (int i = 0; i <= n; ++i) {
+          for (int j = 0; j <= n; ++j) {
+            Eigen::Vector3d p = Eigen::Vector3d::Zero();
+            p[axis] = high * size[axis];
+            p[u] = size[u] * i / n;
+            p[v] = size[v] * j / n;
+            points.push_back(p);
+          }
+        }
+        for (int i = 0; i < n; ++i) {
+          for (int j = 0; j < n; ++j) {
+            const int a = base + i * (n + 1) + j, b = a + n + 1;
+            std::array<std::array<int, 3>, 2> halves{{{a, b, b + 1}, {a, b + 1, a + 1}}};
+            for (auto& t : halves) {
+              if (high == 0) std::swap(t[1], t[2]);
+              triangles.push_back(t);
+              marks.part.push_back(2 * axis + high);
+            }
+          }
+        }
+      }
+    }
+    x.resize(static_cast<Eigen::Index>(points.size()), 3);
+    for (std::size_t i = 0; i < points.size(); ++i) x.row(static_cast<Eigen::Index>(i)) = points[i].transpose();
+    faces.resize(static_cast<Eigen::Index>(triangles.size()), 3);
+    for (std::size_t f = 0; f < triangles.size(); ++f) faces.row(static_cast<Eigen::Index>(f)) << triangles[f][0], triangles[f][1], triangles[f][2];
+    for (const char* side : {"right", "left", "bottom", "top", "back", "front"}) marks.parts.push_back({side, ""});
+    for (const int part : marks.part) marks.color.push_back(part == 3 ? 0xff8000 : -1);
+  }
+};
+
+double area(const mesh::SupportMesh& body, const std::string& region) {
+  double sum = 0;
+  for (Eigen::Index f = 0; f < body.faces.rows(); ++f) {
+    const int id = body.face_region[f];
+    const std::string own = id < 0 ? "" : body.region_names[static_cast<std::size_t>(id)];
+    const Eigen::Vector3d a = body.x.row(body.faces(f, 0)), b = body.x.row(body.faces(f, 1)), c = body.x.row(body.faces(f, 2));
+    if (own == region) sum += (b - a).cross(c - a).norm() / 2;
+  }
+  return sum;
+}
+
+}  // namespace
+
+TEST(body_import, regions_by_part_color_box_and_landmark) {
+  const FineBox box(10);
+  io::BodyImportParams params;
+  params.regions = {{.name = "belly", .part = "front"}, {.name = "lid", .color = "FF8001"}, {.name = "foot", .box = {-1, -1, -1, 1, 0.16, 1}},
+                    {.name = "port", .landmarks = {"port"}}, {.name = "starboard", .landmarks = {"starboard"}}};
+  params.landmarks = {{"port", {0.41, 0.8, 0.15}}, {"starboard", {-0.005, 0.8, 0.15}}};
+  const auto body = io::import_body(box.x, box.faces, "box", params, box.marks);
+  ASSERT_TRUE(body) << to_string(body.issues()[0]);
+  EXPECT_NEAR(area(body->mesh, "belly"), 0.4 * 1.44, 1e-9);  // its lowest tenth belongs to the later region
+  EXPECT_NEAR(area(body->mesh, "lid"), 0.4 * 0.3, 1e-9);
+  EXPECT_NEAR(area(body->mesh, "foot"), 0.4 * 0.3 + 1.4 * 0.16, 1e-9);
+  EXPECT_NEAR(area(body->mesh, ""), 0, 1e-12);
+  // The back is shared by the two landmarks' regions, along its middle but for a row of triangles.
+  EXPECT_NEAR(area(body->mesh, "port"), (0.3 + 0.2) * 1.44, 0.04 * 1.44);
+  EXPECT_NEAR(area(body->mesh, "starboard"), (0.3 + 0.2) * 1.44, 0.04 * 1.44);
+  EXPECT_NEAR(body->mesh.landmarks.at("port")[0], 0.4, 1e-15);
+  EXPECT_NEAR(body->mesh.landmarks.at("port")[1], 0.8, 1e-15);
+  EXPECT_NEAR(body->mesh.landmarks.at("starboard")[0], 0, 1e-15);
+}
+
+TEST(body_import, a_wrap_has_the_parts_of_the_scan_under_it) {
+  const FineBox box(10);
+  io::BodyImportParams params;
+  params.wrap = 0.06;
+  params.regions = {{.name = "belly", .part = "front"}};
+  const auto body = io::import_body(box.x, box.faces, "box", params, box.marks);
+  ASSERT_TRUE(body) << to_string(body.issues()[0]);
+  EXPECT_NEAR(area(body->mesh, "belly"), 0.4 * 1.6, 0.05 * 0.4 * 1.6);
+  for (Eigen::Index f = 0; f < body->mesh.faces.rows(); ++f) {
+    const double z = (body->mesh.x(body->mesh.faces(f, 0), 2) + body->mesh.x(body->mesh.faces(f, 1), 2) + body->mesh.x(body->mesh.faces(f, 2), 2)) / 3;
+    if (body->mesh.face_region[f] == 0) EXPECT_GT(z, 0.27);
+    else EXPECT_LT(z, 0.302);
+  }
+}
+
+TEST(body_import, regions_and_landmarks_that_are_nowhere) {
+  const FineBox box(4);
+  io::BodyImportParams params;
+  params.regions = {{.name = "a", .part = "sleeve"}, {.name = "b", .color = "00ff00"}, {.name = "c", .box = {2, 2, 2, 3, 3, 3}}, {.name = "d", .landmarks = {"nose"}}};
+  params.landmarks = {{"ear", {0.43, 0.8, 0.15}}};
+  const auto body = io::import_body(box.x, box.faces, "box", params, box.marks);
+  EXPECT_EQ(codes(body), "off_surface empty_region empty_region empty_region unknown_landmark");
+  params.regions = {{.name = "a"}, {.name = "b", .part = "front", .color = "00ff00"}, {.name = "c", .box = {0, 0, 0}}, {.name = "d", .color = "red"}};
+  EXPECT_EQ(codes(io::import_body(box.x, box.faces, "box", params, box.marks)), "bad_combination bad_combination bad_range bad_range");
+}
+
+TEST(body_import, groups_and_painted_vertices_come_from_files) {
+  const Folder folder;
+  const Box box;
+  std::string grouped;
+  for (Eigen::Index i = 0; i < 8; ++i) grouped += fmt::format("v {} {} {}\n", box.x(i, 0), box.x(i, 1), box.x(i, 2));
+  for (Eigen::Index f = 0; f < 12; ++f) {
+    if (f % 2 == 0) grouped += fmt::format("g side{}\n", f / 2);
+    grouped += fmt::format("f {} {} {}\n", box.faces(f, 0) + 1, box.faces(f, 1) + 1, box.faces(f, 2) + 1);
+  }
+  io::BodyImportParams params;
+  params.regions = {{.name = "front", .part = "side1"}};
+  const auto by_group = io::import_body(folder.write("grouped.obj", grouped), params);
+  ASSERT_TRUE(by_group) << to_string(by_group.issues()[0]);
+  EXPECT_NEAR(area(by_group->mesh, "front"), 0.4 * 1.6, 1e-7);
+  for (Eigen::Index f = 0; f < 12; ++f) {
+    if (by_group->mesh.face_region[f] != 0) continue;
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(by_group->mesh.x(by_group->mesh.faces(f, k), 2), 0.3, 1e-7);
+  }
+
+  std::string painted = fmt::format("ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty uchar green\n"
+                                    "property uchar blue\nelement face 12\nproperty list uchar int vertex_indices\nend_header\n");
+  for (Eigen::Index i = 0; i < 8; ++i) painted += fmt::format("{} {} {} {}\n", box.x(i, 0), box.x(i, 1), box.x(i, 2), box.x(i, 2) > 0.1 ? "255 128 0" : "9 9 9");
+  for (Eigen::Index f = 0; f < 12; ++f) painted += fmt::format("3 {} {} {}\n", box.faces(f, 0), box.faces(f, 1), box.faces(f, 2));
+  params.regions = {{.name = "dark", .color = "0a0a0a"}, {.name = "orange", .color = "ff8000"}};
+  const auto by_paint = io::import_body(folder.write("painted.ply", painted), params);
+  ASSERT_TRUE(by_paint) << to_string(by_paint.issues()[0]);
+  // Front and back are of one colour, and each triangle of the four sides between has two corners of one.
+  const double sides = 2 * (0.4 * 0.3 + 1.6 * 0.3);
+  EXPECT_NEAR(area(by_paint->mesh, "orange"), 0.4 * 1.6 + sides / 2, 1e-7);
+  EXPECT_NEAR(area(by_paint->mesh, "dark"), 0.4 * 1.6 + sides / 2, 1e-7);
+}

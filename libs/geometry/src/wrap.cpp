@@ -45,9 +45,13 @@ Wrap wrap(const Eigen::Ref<const Points3>& x, const Eigen::Ref<const Triangles>&
 
   using Primitive = CGAL::AABB_triangle_primitive<Kernel, std::vector<Kernel::Triangle_3>::const_iterator>;
   std::vector<Kernel::Triangle_3> triangles;
-  for (const auto& t : soup) {
+  std::vector<int> input;  // row of each
+  for (std::size_t f = 0; f < soup.size(); ++f) {
+    const auto& t = soup[f];
     const Kernel::Triangle_3 triangle(points[t[0]], points[t[1]], points[t[2]]);
-    if (!triangle.is_degenerate()) triangles.push_back(triangle);
+    if (triangle.is_degenerate()) continue;
+    triangles.push_back(triangle);
+    input.push_back(static_cast<int>(f));
   }
   CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>> tree(triangles.cbegin(), triangles.cend());
   double square = 0;
@@ -55,6 +59,11 @@ Wrap wrap(const Eigen::Ref<const Points3>& x, const Eigen::Ref<const Triangles>&
     square = std::max(square, tree.squared_distance(Kernel::Point_3(result.x(i, 0), result.x(i, 1), result.x(i, 2))));
   }
   result.farthest = std::sqrt(square);
+  for (Eigen::Index f = 0; f < result.faces.rows() && !triangles.empty(); ++f) {
+    const Eigen::Vector3d middle = (result.x.row(result.faces(f, 0)) + result.x.row(result.faces(f, 1)) + result.x.row(result.faces(f, 2))).transpose() / 3;
+    const auto nearest = tree.closest_point_and_primitive(Kernel::Point_3(middle.x(), middle.y(), middle.z())).second;
+    result.nearest.push_back(input[static_cast<std::size_t>(nearest - triangles.cbegin())]);
+  }
   return result;
 }
 

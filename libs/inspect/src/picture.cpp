@@ -130,6 +130,15 @@ Categories categories(const std::string& color, const mesh::GarmentMesh& g) {
   return result;
 }
 
+Categories regions(const mesh::SupportMesh& support) {
+  Categories result;
+  for (const std::string& name : support.region_names) result.list.emplace_back(name, category_color(static_cast<int>(result.list.size())));
+  const int none = static_cast<int>(result.list.size());
+  if (support.face_region.size() > 0 && support.face_region.minCoeff() < 0) result.list.emplace_back("no region", fabric::Card{}.color);
+  for (const int region : support.face_region) result.of_face.push_back(region >= 0 ? region : none);
+  return result;
+}
+
 /// Buttons, hooks, snaps and teeth as small balls on the cloth's face; those of open fasteners are lighter.
 /// shown  which vertices' halves are drawn
 std::vector<Surface> fastener_balls(const mesh::GarmentMesh& g, const mesh::Points3& x, const std::function<bool(int)>& shown) {
@@ -472,7 +481,7 @@ Result<ColorField> color_field(const std::string& name, const mesh::GarmentMesh&
   if (const auto it = g.face_columns.find(name); it != g.face_columns.end()) return column(it->second, ColorField::Place::faces);
   if (const auto it = g.vertex_columns.find(name); it != g.vertex_columns.end()) return column(it->second, ColorField::Place::vertices);
   if (name == "ease") return Issue{"needs_support", {.item = "color"}, "ease is the distance to a support, and none is given", "add --support FILE", Category::input};
-  std::vector<std::string> known{"plain", "panel", "laminate", "order", "strain_warp", "strain_weft", "strain_bias", "shear", "tension_warp", "tension_weft", "ease"};
+  std::vector<std::string> known{"plain", "panel", "laminate", "order", "strain_warp", "strain_weft", "strain_bias", "shear", "tension_warp", "tension_weft", "ease", "region"};
   for (const auto& [key, c] : g.face_columns) known.push_back(key);
   for (const auto& [key, c] : g.vertex_columns) known.push_back(key);
   return Issue{"unknown_color", {.item = "color"}, fmt::format("the garment has nothing called '{}' to show as colour", name), suggestion(name, known), Category::input};
@@ -490,6 +499,7 @@ Result<Image> draw_picture(const PictureParams& params, const mesh::GarmentMesh*
   const mesh::SupportMesh* measured_from = support;  // ease needs it even where it is not drawn
   if (flat || inside || (params.show == Show::garment && garment != nullptr)) support = nullptr;
   if (params.show == Show::support && support != nullptr) garment = nullptr;
+  if (params.color == "region" && support == nullptr) return Issue{"needs_support", {.item = "color"}, "regions are those of a support, and none is drawn", "give a support, in a view that shows it", Category::input};
 
   RenderScene scene;
   scene.width = (*size)[0];
@@ -523,7 +533,7 @@ Result<Image> draw_picture(const PictureParams& params, const mesh::GarmentMesh*
       kinds = categories(params.color, g);
       surface.colors_on_faces = true;
       for (const int kind : kinds->of_face) surface.colors.push_back(linear(kinds->list[static_cast<std::size_t>(kind)].second));
-    } else if (params.color != "plain") {
+    } else if (params.color != "plain" && params.color != "region") {
       auto found = color_field(params.color, g, measured_from);
       if (!found) return found.issues();
       field = std::move(*found);
@@ -570,6 +580,12 @@ Result<Image> draw_picture(const PictureParams& params, const mesh::GarmentMesh*
     Surface surface;
     surface.kind = Surface::Kind::support;
     surface.colors = {linear(params.support_color)};
+    if (params.color == "region") {
+      kinds = regions(*support);
+      surface.colors_on_faces = true;
+      surface.colors.clear();
+      for (const int kind : kinds->of_face) surface.colors.push_back(linear(kinds->list[static_cast<std::size_t>(kind)].second));
+    }
     for (Eigen::Index f = 0; f < support->faces.rows(); ++f) surface.faces.push_back({support->faces(f, 0), support->faces(f, 1), support->faces(f, 2)});
     if (params.lines == Lines::mesh) surface.lines.assign(surface.faces.size(), {EdgeLine::mesh, EdgeLine::mesh, EdgeLine::mesh});
     add_surface(scene, std::move(surface), support->x, vertex_normals(support->x, support->faces));

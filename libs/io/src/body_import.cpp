@@ -1,5 +1,6 @@
 #include "toile/io/body_import.h"
 
+#include "body_regions.h"
 #include "toile/geometry/wrap.h"
 #include "toile/mesh/topology.h"
 
@@ -68,7 +69,20 @@ std::vector<std::array<int, 3>> triangulated(const std::vector<Vector3d>& points
   return result;
 }
 
-void collect(const aiScene& scene, const aiNode& node, const aiMatrix4x4& parent, std::vector<Vector3d>& points, std::vector<std::array<int, 3>>& faces) {
+int byte(float share) { return static_cast<int>(std::lround(255 * std::clamp(share, 0.0f, 1.0f))); }
+
+/// Colour of at least two of the three corners, to within 2 of 255; -1: there is none.
+int common_color(const std::array<std::array<int, 3>, 3>& corners) {
+  const auto alike = [](const std::array<int, 3>& a, const std::array<int, 3>& b) {
+    return std::abs(a[0] - b[0]) <= 2 && std::abs(a[1] - b[1]) <= 2 && std::abs(a[2] - b[2]) <= 2;
+  };
+  for (const std::size_t k : {std::size_t{0}, std::size_t{1}, std::size_t{2}}) {
+    if (alike(corners[k], corners[(k + 1) % 3])) return corners[k][0] << 16 | corners[k][1] << 8 | corners[k][2];
+  }
+  return -1;
+}
+
+void collect(const aiScene& scene, const aiNode& node, const aiMatrix4x4& parent, std::vector<Vector3d>& points, std::vector<std::array<int, 3>>& faces, FaceMarks& marks) {
   const aiMatrix4x4 here = parent * node.mTransformation;
   const bool mirrored = here.Determinant() < 0;
   for (unsigned i = 0; i < node.mNumMeshes; ++i) {
@@ -78,6 +92,10 @@ void collect(const aiScene& scene, const aiNode& node, const aiMatrix4x4& parent
       const aiVector3D p = here * m.mVertices[v];
       points.emplace_back(p.x, p.y, p.z);
     }
+    const int part = static_cast<int>(marks.parts.size());
+    std::vector<std::string>& names = marks.parts.emplace_back();
+    names = {node.mName.C_Str(), m.mName.C_Str()};
+    if (m.mMaterialIndex < scene.mNumMaterials) names.emplace_back(scene.mMaterials[m.mMaterialIndex]->GetName().C_Str());
     for (unsigned f = 0; f < m.mNumFaces; ++f) {
       if (m.mFaces[f].mNumIndices < 3) continue;  // points and lines
       std::vector<int> ring;
@@ -86,10 +104,21 @@ void collect(const aiScene& scene, const aiNode& node, const aiMatrix4x4& parent
         ring.push_back(base + static_cast<int>(m.mFaces[f].mIndices[k]));
       }
       if (mirrored) std::reverse(ring.begin(), ring.end());
-      for (const auto& face : triangulated(points, ring)) faces.push_back(face);
+      for (const auto& face : triangulated(points, ring)) {
+        faces.push_back(face);
+        marks.part.push_back(part);
+        marks.color.push_back(-1);
+        if (!m.mColors[0]) continue;
+        std::array<std::array<int, 3>, 3> corners;
+        for (const std::size_t k : {std::size_t{0}, std::size_t{1}, std::size_t{2}}) {
+          const aiColor4D& c = m.mColors[0][face[k] - base];
+          corners[k] = {byte(c.r), byte(c.g), byte(c.b)};
+        }
+        marks.color.back() = common_color(corners);
+      }
     }
   }
-  for (unsigned i = 0; i < node.mNumChildren; ++i) collect(scene, *node.mChildren[i], here, points, faces);
+  for (unsigned i = 0; i < node.mNumChildren; ++i) collect(scene, *node.mChildren[i], here, points, faces, marks);
 }
 
 /// Piece of every face, numbered by the lowest face.
@@ -245,6 +274,7 @@ Result<ImportedBody> import_body(const std::string& path, const BodyImportParams
   if (std::filesystem::file_size(path, error) == 0) return Issue{"cannot_read", {.file = path}, "the file is empty", "export the body again"};
   std::vector<Vector3d> points;
   std::vector<std::array<int, 3>> faces;
+  FaceMarks marks;
   try {
     Assimp::Importer importer;
     const aiScene* scene = importer.ReadFile(path, 0);
@@ -253,7 +283,7 @@ Result<ImportedBody> import_body(const std::string& path, const BodyImportParams
       return Issue{"cannot_read", {.file = path}, "not a mesh that can be read" + (why.empty() ? "" : " (" + why + ")"),
                    "export the body as OBJ, STL, PLY or glTF"};
     }
-    collect(*scene, *scene->mRootNode, aiMatrix4x4(), points, faces);
+    collect(*scene, *scene->mRootNode, aiMatrix4x4(), points, faces, marks);
   } catch (const std::exception& e) {
     return Issue{"cannot_read", {.file = path}, fmt::format("not a mesh that can be read ({})", e.what()), "export the body as OBJ, STL, PLY or glTF"};
   }
@@ -262,10 +292,10 @@ Result<ImportedBody> import_body(const std::string& path, const BodyImportParams
   for (std::size_t i = 0; i < points.size(); ++i) x.row(static_cast<Eigen::Index>(i)) = points[i].transpose();
   mesh::Triangles t(static_cast<Eigen::Index>(faces.size()), 3);
   for (std::size_t f = 0; f < faces.size(); ++f) t.row(static_cast<Eigen::Index>(f)) << faces[f][0], faces[f][1], faces[f][2];
-  return import_body(std::move(x), std::move(t), path, params);
+  return import_body(std::move(x), std::move(t), path, params, marks);
 }
 
-Result<ImportedBody> import_body(mesh::Points3 x, mesh::Triangles faces, const std::string& name, const BodyImportParams& params) {
+Result<ImportedBody> import_body(mesh::Points3 x, mesh::Triangles faces, const std::string& name, const BodyImportParams& params, const FaceMarks& marks) {
   Issues issues = validate(params);
   for (Issue& issue : issues) issue.category = Category::usage;
   if (!issues.empty()) return issues;
@@ -280,6 +310,7 @@ Result<ImportedBody> import_body(mesh::Points3 x, mesh::Triangles faces, const s
   x = (x * world_from_file.transpose() * metres(params.unit)).eval();
 
   ImportedBody body;
+  std::vector<int> source;  // of each face, its row as it came
   // Equal positions become one vertex, in order of first use.
   {
     const auto less = [](const Vector3d& a, const Vector3d& b) { return std::tie(a.x(), a.y(), a.z()) < std::tie(b.x(), b.y(), b.z()); };
@@ -304,6 +335,7 @@ Result<ImportedBody> import_body(mesh::Points3 x, mesh::Triangles faces, const s
         continue;
       }
       welded.row(count++) << v[0], v[1], v[2];
+      source.push_back(static_cast<int>(f));
     }
     body.joined_corners = used_rows - static_cast<int>(kept.size());
     faces = welded.topRows(count);
@@ -370,6 +402,9 @@ Result<ImportedBody> import_body(mesh::Points3 x, mesh::Triangles faces, const s
     }
     x = std::move(points);
     faces = std::move(own);
+    std::vector<int> kept;
+    for (const int f : parts[0].faces) kept.push_back(source[static_cast<std::size_t>(f)]);
+    source = std::move(kept);
     parts.resize(1);
   }
 
@@ -379,6 +414,8 @@ Result<ImportedBody> import_body(mesh::Points3 x, mesh::Triangles faces, const s
     geometry::Wrap closed = geometry::wrap(x, faces, params.wrap, params.wrap_offset);
     x = std::move(closed.x);
     faces = std::move(closed.faces);
+    for (int& f : closed.nearest) f = source[static_cast<std::size_t>(f)];
+    source = std::move(closed.nearest);
     check_wrap(x, faces, std::abs(parts[0].facts.volume), name, params, issues);
     body.wrap_distance = closed.farthest;
   } else {
@@ -398,6 +435,7 @@ Result<ImportedBody> import_body(mesh::Points3 x, mesh::Triangles faces, const s
   body.mesh.faces = std::move(faces);
   body.mesh.face_region = mesh::Ids::Constant(body.mesh.faces.rows(), -1);
   issues = mesh::validate(body.mesh);
+  if (issues.empty()) issues = name_regions(body.mesh, params, marks, source);
   for (Issue& issue : issues) issue.place.file = name;
   if (!issues.empty()) return issues;
   return body;

@@ -3,11 +3,14 @@
 
 #include "toile/geometry/slice.h"
 
+#include <vector>
+
 namespace toile::geometry {
 
 struct Wrap {
   Points3 x;        ///< [m], |V| x 3
   Triangles faces;  ///< outward, closed, without intersections, |F| x 3
+  std::vector<int> nearest;  ///< of each face, the triangle (row of the input) that lies nearest to its middle
   double farthest = 0;  ///< of the wrap's vertices from the triangles that it was drawn round [m]
 };
 

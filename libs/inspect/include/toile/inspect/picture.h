@@ -37,7 +37,7 @@ struct PictureParams {
     f(&PictureParams::view, {.key = "view", .doc = "where the camera stands; side is left (the wearer's); inside leaves out the near half of the cloth and the support; flat lays the panels out as cut"});
     f(&PictureParams::azimuth, {.key = "azimuth", .doc = "camera's turn about the vertical instead of the view's: 0 in front, 90 deg at the wearer's left", .unit = "rad", .min = -7, .max = 7});
     f(&PictureParams::elevation, {.key = "elevation", .doc = "camera's height as an angle instead of the view's", .unit = "rad", .min = -1.56, .max = 1.56});
-    f(&PictureParams::color, {.key = "color", .doc = "plain, panel, laminate, order (of free layers), strain_warp, strain_weft, shear, strain_bias, tension_warp, tension_weft, ease, or the name of a vertex or face column of the garment"});
+    f(&PictureParams::color, {.key = "color", .doc = "plain, panel, laminate, order (of free layers), strain_warp, strain_weft, shear, strain_bias, tension_warp, tension_weft, ease, the name of a vertex or face column of the garment, or region (of the support)"});
     f(&PictureParams::range, {.key = "range", .doc = "values at the two ends of the colour scale, in the unit that the legend shows; otherwise taken from the data"});
     f(&PictureParams::smoothing, {.key = "smoothing", .doc = "colours of faces averaged to vertices inside a panel, or as they are"});
     f(&PictureParams::lines, {.key = "lines", .doc = "which lines are drawn: seams, free edges and folds (dashed), the whole mesh too, or none"});

@@ -6,6 +6,7 @@
 #include "toile/mesh/support_mesh.h"
 
 #include <array>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,38 @@ enum class Winding {
 };
 enum class Pieces { all, largest };
 enum class Standing { keep, floor };
+enum class Segmentation {
+  none,
+  body,  ///< trunk, neck, arms and legs from sections
+};
+
+/// A named part of the surface. One of the four says which faces.
+struct BodyRegion {
+  std::string name;
+  std::vector<double> box;  ///< [m], lowest x y z, highest x y z
+  std::string part;
+  std::string color;
+  std::vector<std::string> landmarks;
+  static void describe(auto& f) {
+    f(&BodyRegion::name, {.key = "name", .doc = "such as torso, neck, arm_left; toile-place gives `offsets` by it", .required = true});
+    f(&BodyRegion::box, {.key = "box", .doc = "faces whose middle lies between these corners: lowest x, y, z, highest x, y, z", .unit = "m"});
+    f(&BodyRegion::part, {.key = "part", .doc = "faces of the file's object, group or material of that name"});
+    f(&BodyRegion::color, {.key = "color", .doc = "faces painted so: two corners of the colour rrggbb, to within 2 of 255"});
+    f(&BodyRegion::landmarks, {.key = "landmarks", .doc = "faces that no other way names and that are nearest, along the surface, to one of these landmarks"});
+    f.check([](const BodyRegion& r, Issues& issues) {
+      const int ways = int{!r.box.empty()} + int{!r.part.empty()} + int{!r.color.empty()} + int{!r.landmarks.empty()};
+      if (ways != 1) {
+        issues.push_back(Issue{"bad_combination", {.item = r.name}, fmt::format("{} of box, part, color and landmarks are given", ways), "give one of them"});
+      }
+      if (!r.box.empty() && (r.box.size() != 6 || r.box[0] >= r.box[3] || r.box[1] >= r.box[4] || r.box[2] >= r.box[5])) {
+        issues.push_back(Issue{"bad_range", {.item = "box"}, "not a box", "give six numbers: the lowest x, y, z, then the highest"});
+      }
+      if (!r.color.empty() && (r.color.size() != 6 || r.color.find_first_not_of("0123456789abcdefABCDEF") != std::string::npos)) {
+        issues.push_back(Issue{"bad_range", {.item = "color"}, "'" + r.color + "' is not a colour", "give six hexadecimal digits in quotes, such as 'ff8000'"});
+      }
+    });
+  }
+};
 
 struct BodyImportParams {
   LengthUnit unit = LengthUnit::m;
@@ -31,6 +64,10 @@ struct BodyImportParams {
   double wrap_offset = 1e-3;
   double smallest_size = 0.3;
   double largest_size = 3.0;
+  std::map<std::string, std::array<double, 3>> landmarks;
+  double landmark_tolerance = 0.02;
+  std::vector<BodyRegion> regions;
+  Segmentation segment = Segmentation::none;  ///< what import_body leaves to its caller (placement/segment.h)
 
   static void describe(auto& f) {
     f(&BodyImportParams::unit, {.key = "unit", .doc = "unit of the file's coordinates; mesh files seldom say it themselves", .required = true});
@@ -43,6 +80,10 @@ struct BodyImportParams {
     f(&BodyImportParams::wrap_offset, {.key = "wrap_offset", .doc = "how far outside the body that surface lies", .unit = "m", .min = 1e-5, .max = 1});
     f(&BodyImportParams::smallest_size, {.key = "smallest_size", .doc = "the body's largest extent is at least this", .unit = "m", .min = 1e-6, .max = 1e4});
     f(&BodyImportParams::largest_size, {.key = "largest_size", .doc = "the body's largest extent is at most this", .unit = "m", .min = 1e-6, .max = 1e4});
+    f(&BodyImportParams::landmarks, {.key = "landmarks", .doc = "named points x, y, z of the result (metres, y up, facing +z, after `standing`); each goes to the surface's nearest point", .unit = "m"});
+    f(&BodyImportParams::landmark_tolerance, {.key = "landmark_tolerance", .doc = "a landmark farther from the surface than this is an error", .unit = "m", .min = 0, .max = 1});
+    f(&BodyImportParams::regions, {.key = "regions", .doc = "named parts of the surface; where box, part and color name a face twice, the later region has it"});
+    f(&BodyImportParams::segment, {.key = "segment", .doc = "body: faces without a region get one of torso, neck, arm_left, arm_right, leg_left, leg_right, from the body's sections"});
     f.check([](const BodyImportParams& p, Issues& issues) {
       if (static_cast<int>(p.up) % 3 == static_cast<int>(p.facing) % 3) {
         issues.push_back(Issue{"bad_axes", {.item = "facing"}, "up and facing lie along the same axis", "name two different axes"});
@@ -52,6 +93,13 @@ struct BodyImportParams {
       }
     });
   }
+};
+
+/// What a file says of its faces beside their place.
+struct FaceMarks {
+  std::vector<std::vector<std::string>> parts;  ///< names (object, group, mesh, material) that a face may bear
+  std::vector<int> part;                        ///< of each face, index into parts; empty: none
+  std::vector<int> color;                       ///< of each face, 0xrrggbb of at least two of its corners, or -1; empty: none
 };
 
 struct BodyPiece {
@@ -71,11 +119,13 @@ struct ImportedBody {
 
 /// Reads a mesh file. Vertices of exactly equal position are one vertex.
 /// error  Issue "cannot_read" (not there, not a mesh, no faces), "implausible_size", "open_surface", "not_manifold",
-///        "inside_out", "wrap_enters" (a hole wider than params.wrap, so that the wrap lines the inside), each with counts and places; no guess is made on unit or axes
+///        "inside_out", "wrap_enters" (a hole wider than params.wrap, so that the wrap lines the inside), "off_surface" (a landmark), "unknown_landmark", "empty_region", each
+///        with counts and places; no guess is made on unit or axes
 Result<ImportedBody> import_body(const std::string& path, const BodyImportParams& params);
 
 /// The same from triangles in the file's own coordinates (one row of x a corner or a vertex).
-Result<ImportedBody> import_body(mesh::Points3 x, mesh::Triangles faces, const std::string& name, const BodyImportParams& params);
+/// marks  of the faces, for regions by part and color
+Result<ImportedBody> import_body(mesh::Points3 x, mesh::Triangles faces, const std::string& name, const BodyImportParams& params, const FaceMarks& marks = {});
 
 }  // namespace toile::io
 
@@ -104,4 +154,9 @@ template <>
 struct toile::Choices<toile::io::Standing> {
   using E = toile::io::Standing;
   static constexpr std::array names{std::pair{"keep", E::keep}, std::pair{"floor", E::floor}};
+};
+template <>
+struct toile::Choices<toile::io::Segmentation> {
+  using E = toile::io::Segmentation;
+  static constexpr std::array names{std::pair{"none", E::none}, std::pair{"body", E::body}};
 };
