@@ -10,7 +10,8 @@ help:
 	@echo 'make jacket   a man'"'"'s jacket, from pattern to layered shell, put on a dress form (not yet draped)'
 	@echo 'make waistcoat   the same of a waistcoat'
 	@echo 'make test     build and run all tests'
-	@echo 'make bench    time the tee stage by stage, cutting, sewing and layering of up to a million triangles, and placement'
+	@echo 'make bench    time the tee stage by stage, cutting, sewing and layering of up to a million triangles, placement,'
+	@echo '             and simulation beside Blender where that is installed'
 	@echo 'make docs     write docs/stages/ from the programs'
 	@echo 'make asan, make ubsan   the tests under AddressSanitizer or UndefinedBehaviorSanitizer'
 	@echo 'make clean    remove build/'
@@ -33,11 +34,12 @@ test: configure
 
 bench: deps
 	@cmake --preset release -DTOILE_BENCH=ON
-	@cmake --build $(BUILD) --target tools pipeline_bench tailoring_bench placement_bench -j $(JOBS)
+	@cmake --build $(BUILD) --target tools pipeline_bench tailoring_bench placement_bench simulation_bench -j $(JOBS)
 	@mkdir -p build/bench
 	@$(BUILD)/bench/pipeline_bench $(BUILD)/bin pipelines/tee/pipeline.yaml build/bench build/bench/report.json
-	@$(BUILD)/bench/tailoring_bench $(BUILD)/bin . build/bench/tailoring build/bench/tailoring.json
-	@$(BUILD)/bench/placement_bench . --json > build/bench/placement.json
+	@$(BUILD)/bench/tailoring_bench $(BUILD)/bin . build/bench/tailoring build/bench/report.json
+	@$(BUILD)/bin/placement_bench . build/bench/report.json
+	@$(BUILD)/bench/simulation_bench $(BUILD)/bin . build/bench/simulation build/bench/report.json
 
 docs: tools
 	@scripts/generate-docs.sh $(BUILD)/bin docs/stages

@@ -1,5 +1,6 @@
 // Case A of the comparison with other simulators: a square metre of shirting falls on a sphere of 0.25 m radius, 1 s.
 // drape_bench [--n 118] [--seconds 1] [--threads N] [--step S] [--equilibrium] [--log FILE] [--json]
+#include "cases.h"
 #include "cloth_fixtures.h"
 #include "toile/base/parallel.h"
 #include "toile/dynamics/simulate.h"
@@ -23,37 +24,6 @@ double cpu_seconds() {
   timespec t{};
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-}
-
-/// 38 rings of 39 segments and two poles: 1,484 vertices, 2,964 triangles, y up.
-mesh::SupportMesh sphere(double radius) {
-  constexpr int rings = 38, segments = 39;
-  mesh::SupportMesh s;
-  s.x.resize(rings * segments + 2, 3);
-  s.x.row(0) << 0, radius, 0;
-  for (int r = 0; r < rings; ++r) {
-    const double theta = M_PI * (r + 1) / (rings + 1);
-    for (int k = 0; k < segments; ++k) {
-      const double phi = 2 * M_PI * k / segments;
-      s.x.row(1 + r * segments + k) << radius * std::sin(theta) * std::cos(phi), radius * std::cos(theta), -radius * std::sin(theta) * std::sin(phi);
-    }
-  }
-  const int last = rings * segments + 1;
-  s.x.row(last) << 0, -radius, 0;
-  std::vector<std::array<int, 3>> faces;
-  for (int k = 0; k < segments; ++k) faces.push_back({0, 1 + k, 1 + (k + 1) % segments});
-  for (int r = 0; r + 1 < rings; ++r) {
-    for (int k = 0; k < segments; ++k) {
-      const int a = 1 + r * segments + k, b = 1 + r * segments + (k + 1) % segments;
-      faces.push_back({a, a + segments, b + segments});
-      faces.push_back({a, b + segments, b});
-    }
-  }
-  for (int k = 0; k < segments; ++k) faces.push_back({last, 1 + (rings - 1) * segments + (k + 1) % segments, 1 + (rings - 1) * segments + k});
-  s.faces.resize(static_cast<Eigen::Index>(faces.size()), 3);
-  for (std::size_t f = 0; f < faces.size(); ++f) s.faces.row(static_cast<Eigen::Index>(f)) << faces[f][0], faces[f][1], faces[f][2];
-  s.face_region = mesh::Ids::Constant(s.faces.rows(), -1);
-  return s;
 }
 
 }  // namespace
@@ -89,7 +59,7 @@ int main(int argc, char** argv) {
   mesh::GarmentMesh cloth;
   fixtures::add_fabric(cloth, *card);
   fixtures::add_grid_panel(cloth, "square", n - 1, n - 1, 1, 1, [](double u, double v) { return Eigen::Vector3d(u - 0.5, 0.3, 0.5 - v); });
-  const mesh::SupportMesh ball = sphere(0.25);
+  const mesh::SupportMesh ball = bench::ball();
   params.mode = equilibrium ? dynamics::Mode::equilibrium : dynamics::Mode::motion;
   if (!log.empty()) params.log = log;
 

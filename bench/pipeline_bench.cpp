@@ -8,6 +8,7 @@
 
 #include "garments.h"
 #include "process.h"
+#include "report.h"
 #include "toile/base/text.h"
 #include "toile/io/file.h"
 #include "toile/io/ply.h"
@@ -73,7 +74,7 @@ int main(int argc, char** argv) {
   rows.push_back({{"case", "read a garment"}, {"triangles", garment.face_count()}, {"seconds", read_s}});
   fmt::print("{} triangles, binary: written in {:.2f} s, read and validated in {:.2f} s\n", garment.face_count(), write_s, read_s);
   fs::remove(file);
-  if (!io::write_file(report_file, nlohmann::ordered_json{{"rows", rows}}.dump(2) + "\n").empty()) return 1;
+  if (!add_rows(report_file, "pipeline", rows)) return 1;
   fmt::print("report: {}\n", report_file);
   return total.code;
 }

@@ -1,10 +1,10 @@
 // Times the placement of the tee on its dress form, from a thousand particles to a hundred thousand.
-// usage: placement_bench SOURCE_DIR [--json]
+// usage: placement_bench SOURCE_DIR [REPORT.json]
 #include <chrono>
 #include <ctime>
 #include <nlohmann/json.hpp>
-#include <string_view>
 
+#include "report.h"
 #include "toile/base/parallel.h"
 #include "toile/form/form.h"
 #include "toile/io/file.h"
@@ -29,11 +29,10 @@ T checked(Result<T> result) {
 
 int main(int argc, char** argv) {
   if (argc < 2) {
-    fmt::print(stderr, "usage: placement_bench SOURCE_DIR [--json]\n");
+    fmt::print(stderr, "usage: placement_bench SOURCE_DIR [REPORT.json]\n");
     return 2;
   }
   const std::string source = argv[1];
-  const bool json = argc > 2 && std::string_view(argv[2]) == "--json";
   const auto text = [&](const std::string& name) { return checked(io::read_file(source + "/" + name)); };
   const auto measurements = checked(io::read_record<form::Measurements>(text("samples/measurements/man178.yaml"), "man178.yaml"));
   const mesh::SupportMesh form = checked(form::make_form(measurements, checked(io::read_record<form::FormParams>(text("pipelines/tee/form.yaml"), "form.yaml")))).mesh;
@@ -42,7 +41,7 @@ int main(int argc, char** argv) {
   const auto seams = checked(io::read_record<tailor::SewParams>(text("pipelines/tee/seams.yaml"), "seams.yaml"));
 
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();
-  if (!json) fmt::print("{:>8} {:>9} {:>8} {:>8} {:>14} {:>14} {:>14} {:>9}\n", "grid mm", "vertices", "wall s", "cpu s", "largest strain", "rms strain", "mean gap mm", "findings");
+  fmt::print("{:>8} {:>9} {:>8} {:>8} {:>14} {:>14} {:>14} {:>9}\n", "grid mm", "vertices", "wall s", "cpu s", "largest strain", "rms strain", "mean gap mm", "findings");
   for (const double cell : {28e-3, 10e-3, 8.8e-3, 5e-3, 2.8e-3}) {
     auto mesh_params = checked(io::read_record<tailor::MeshParams>(text("pipelines/tee/mesh.yaml"), "mesh.yaml"));
     mesh_params.cell = cell;
@@ -55,8 +54,7 @@ int main(int argc, char** argv) {
     const auto& report = placed.report;
     rows.push_back({{"case", "place the tee"}, {"cell", cell}, {"vertices", garment.vertex_count()}, {"seconds", wall_s}, {"cpu_s", cpu_s},
                     {"max_edge_strain", report.max_strain}, {"rms_edge_strain", report.rms_strain}, {"mean_seam_gap", report.mean_seam_gap}, {"findings", placed.findings.size()}});
-    if (!json) fmt::print("{:8.1f} {:9} {:8.2f} {:8.2f} {:14.5f} {:14.6f} {:14.2f} {:9}\n", 1e3 * cell, garment.vertex_count(), wall_s, cpu_s, report.max_strain, report.rms_strain, 1e3 * report.mean_seam_gap, placed.findings.size());
+    fmt::print("{:8.1f} {:9} {:8.2f} {:8.2f} {:14.5f} {:14.6f} {:14.2f} {:9}\n", 1e3 * cell, garment.vertex_count(), wall_s, cpu_s, report.max_strain, report.rms_strain, 1e3 * report.mean_seam_gap, placed.findings.size());
   }
-  if (json) fmt::print("{}\n", nlohmann::ordered_json{{"rows", rows}}.dump(2));
-  return 0;
+  return argc < 3 || bench::add_rows(argv[2], "placement", rows) ? 0 : 1;
 }

@@ -23,8 +23,8 @@ struct Usage {
   double wall = 0, cpu = 0, peak_mb = 0;
 };
 
-/// Runs a program, its output thrown away.
-inline Usage timed(const std::vector<std::string>& words) {
+/// Runs a program; its standard output goes to a file, or is thrown away.
+inline Usage timed(const std::vector<std::string>& words, const std::string& output = "/dev/null") {
   std::vector<char*> argv;
   for (const std::string& word : words) argv.push_back(const_cast<char*>(word.c_str()));
   argv.push_back(nullptr);
@@ -32,7 +32,7 @@ inline Usage timed(const std::vector<std::string>& words) {
   std::fflush(stdout);  // or the child writes the pending rows again
   const pid_t child = ::fork();
   if (child == 0) {
-    if (!std::freopen("/dev/null", "w", stdout)) ::_exit(127);
+    if (!std::freopen(output.c_str(), "w", stdout)) ::_exit(127);
     ::execv(argv[0], argv.data());
     ::_exit(127);
   }

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "process.h"
+#include "report.h"
 #include "toile/base/text.h"
 #include "toile/io/file.h"
 #include "toile/io/ply.h"
@@ -100,7 +101,7 @@ int main(int argc, char** argv) {
       }
     }
   }
-  if (!io::write_file(report_file, nlohmann::ordered_json{{"rows", rows}}.dump(2) + "\n").empty()) return 1;
+  if (!add_rows(report_file, "tailoring", rows)) return 1;
   fmt::print("report: {}\n", report_file);
   return code;
 }
