@@ -225,6 +225,7 @@ Issues Run::build(const Ids& node_of_vertex) {
   mechanics::SheetOptions options;
   options.link_stiffness = params_.seam_stiffness;
   options.directed_vertices = directed_vertices_;
+  options.internal_friction = params_.internal_friction;
   Result<Sheet> sheet = mechanics::make_sheet(garment_, node_of_vertex, options);
   if (!sheet) return sheet.issues();
   sheet_ = std::move(*sheet);
@@ -809,6 +810,8 @@ void Run::equilibria() {
     set_time(params_.duration * k / params_.increments);
     if (!relax()) report_.converged = false;
     record_row();
+    // Within an increment friction between yarns is a potential: where it leads does not depend on the iterations.
+    mechanics::advance_friction(sheet_, x_);
     if (hooks_.progress && params_.increments > 1) {
       hooks_.progress(static_cast<double>(k) / params_.increments, fmt::format("increment {} of {}, residual {:.2e}", k, params_.increments, static_residual()));
     }
@@ -853,6 +856,7 @@ void Run::move_in_time() {
     }
     if (!done) ++report_.unconverged_steps;
     velocity_ = (x_ - start_) / step_;
+    mechanics::advance_friction(sheet_, x_);
     friction_ = update_friction(friction_, start_, contacts_, x_, support_x_, sheet_.area, laws_);
     report_.simulated_time = (i + 1) * step_;
     log_row("moving");
@@ -1119,6 +1123,7 @@ GarmentMesh Run::output() const {
       ++c;
     }
   }
+  mechanics::store_friction(sheet_, result);
   result.marks["converged"] = report_.converged ? "yes" : "no";
   result.marks["residual"] = fmt::format("{}", report_.residual);
   return result;

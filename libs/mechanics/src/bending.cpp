@@ -343,6 +343,8 @@ void Builder::add_grid() {
         add(form.form, slope, -sign * 2 / length);
         form.axis = kind;
         form.vertex = v;
+        form.sides = k == 0 ? 1 : 2;
+        for (std::size_t i = 0; i < 4; ++i) form.normal[i] = node(next_[static_cast<std::size_t>(v)][i] >= 0 ? next_[static_cast<std::size_t>(v)][i] : v);
         return form;
       };
       const bool even = !held && (side[0].area <= 0 || side[1].area <= 0 ||
@@ -350,6 +352,7 @@ void Builder::add_grid() {
       if (even) {  // both sides have the same curvature
         CurvatureForm form = one_side(side[0].area > 0 ? 0 : 1);
         form.weight = side[0].area + side[1].area;
+        form.sides = (side[0].area > 0 ? 1 : 0) + (side[1].area > 0 ? 2 : 0);
         form.rigidity = (side[0].stiffness + side[1].stiffness) / form.weight;
         form.fabric = side[0].area > 0 ? side[0].fabric : side[1].fabric;
         result_.curvatures.push_back(std::move(form));
@@ -635,6 +638,8 @@ void Builder::add_triangles() {
       form.axis = axes[r];
       form.fabric = fabric_id(f);
       form.face = f;
+      const auto& corner = sheet_.corners[static_cast<std::size_t>(f)];
+      form.normal = {corner[1], corner[0], corner[2], corner[0]};
       result_.curvatures.push_back(std::move(form));
     }
   }

@@ -20,6 +20,8 @@ struct CurvatureForm {
   Axis axis = Axis::weft;
   int fabric = 0;        ///< index into Sheet::fabrics
   int vertex = -1, face = -1;  ///< where it belongs: a vertex of the grid, or a face (exactly one, except twist of a cell)
+  int sides = 0;         ///< of a vertex: 1 the side of increasing coordinate, 2 the other, 3 both
+  std::array<int, 4> normal{};  ///< unless twist: nodes a, b, c, d of the normal (x_a - x_b) x (x_c - x_d)
 };
 
 /// What bends beside the linear forms: an edge whose two sides meet at an angle, energy stiffness/2 (angle - rest)^2.

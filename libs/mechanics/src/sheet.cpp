@@ -157,6 +157,89 @@ YarnState mean_state(const Sheet& sheet, const MembraneUnit& unit, const YarnSta
 
 fabric::CurvePoint scaled(const fabric::CurvePoint& p, double factor) { return {factor * p.energy, factor * p.force, factor * p.slope}; }
 
+// What a face and a pair of faces answer to a state, with internal friction where the sheet has it.
+fabric::CurvePoint weft_of_face(const Sheet& sheet, std::size_t f, double stretch) {
+  const auto fabric = static_cast<std::size_t>(sheet.fabric_of_face[f]);
+  const fabric::TensileCurve& curve = sheet.fabrics[fabric].weft;
+  return sheet.friction ? sheet.friction->stretch[f][0].at(curve, sheet.friction->laws[fabric].loss_weft, stretch - 1) : curve.at(stretch - 1);
+}
+fabric::CurvePoint warp_of_face(const Sheet& sheet, std::size_t f, double stretch) {
+  const auto fabric = static_cast<std::size_t>(sheet.fabric_of_face[f]);
+  const fabric::TensileCurve& curve = sheet.fabrics[fabric].warp;
+  return sheet.friction ? sheet.friction->stretch[f][1].at(curve, sheet.friction->laws[fabric].loss_warp, stretch - 1) : curve.at(stretch - 1);
+}
+fabric::CurvePoint shear_of_face(const Sheet& sheet, std::size_t f, double sine) {
+  const auto fabric = static_cast<std::size_t>(sheet.fabric_of_face[f]);
+  fabric::CurvePoint p = sheet.fabrics[fabric].shear.at(sine);
+  if (!sheet.friction) return p;
+  const fabric::CurvePoint q = sheet.friction->shear[f].at(sheet.friction->laws[fabric].shear, sine);
+  return {p.energy + q.energy, p.force + q.force, p.slope + q.slope};
+}
+/// Weft and warp of a pair's mean.
+std::array<fabric::CurvePoint, 2> of_pair(const Sheet& sheet, std::size_t unit, const YarnState& mean) {
+  const auto fabric = static_cast<std::size_t>(sheet.fabric_of_face[static_cast<std::size_t>(sheet.units[unit].first)]);
+  const fabric::Constitutive& data = sheet.fabrics[fabric];
+  if (!sheet.friction) return {scaled(data.weft.at(mean.weft - 1), 1 - own_part), scaled(data.warp.at(mean.warp - 1), 1 - own_part)};
+  const auto& sliders = sheet.friction->pair_stretch[unit];
+  const InternalFriction::Law& law = sheet.friction->laws[fabric];
+  return {scaled(sliders[0].at(data.weft, law.loss_weft, mean.weft - 1), 1 - own_part), scaled(sliders[1].at(data.warp, law.loss_warp, mean.warp - 1), 1 - own_part)};
+}
+
+double half_height(const Sheet& sheet, const CurvatureForm& c) {
+  const fabric::Hysteresis& h = sheet.fabrics[static_cast<std::size_t>(c.fabric)].hysteresis;
+  return c.axis == CurvatureForm::Axis::weft ? h.moment_weft : c.axis == CurvatureForm::Axis::warp ? h.moment_warp : 0;
+}
+
+/// Twist has no friction of its own: bent at 45 degrees, cloth moves the sliders of both yarns, and they give the mean of both loops.
+bool has_slider(const Sheet& sheet, const CurvatureForm& c) { return half_height(sheet, c) > 0; }
+
+InternalFriction make_friction(const Sheet& sheet, const std::vector<CurvatureForm>& curvatures) {
+  InternalFriction friction;
+  for (const fabric::Constitutive& f : sheet.fabrics) friction.laws.push_back(friction_law(f));
+  for (const CurvatureForm& c : curvatures) {
+    if (!has_slider(sheet, c)) continue;
+    InternalFriction::Bending b;
+    b.slider = moment_slider(sheet.fabrics[static_cast<std::size_t>(c.fabric)], c.rigidity, half_height(sheet, c));
+    b.weight = c.weight;
+    b.normal = c.normal;
+    b.form_begin = static_cast<int>(friction.form_coefficient.size());
+    b.warp = c.axis == CurvatureForm::Axis::warp;
+    b.vertex = c.vertex;
+    b.face = c.face;
+    b.sides = c.sides;
+    for (const auto& [node, coefficient] : c.form) friction.form_coefficient.push_back(coefficient);
+    friction.bending.push_back(b);
+  }
+  friction.shear.resize(sheet.corners.size());
+  friction.stretch.resize(sheet.corners.size());
+  friction.pair_stretch.resize(sheet.units.size());
+  return friction;
+}
+
+/// Energy of a slider with its derivatives by the curvature; the curvature's gradient by entry into `gradient`.
+fabric::CurvePoint slider_state(const Sheet& sheet, std::size_t slider, const Points3& x, Eigen::Vector3d* gradient) {
+  const InternalFriction::Bending& b = sheet.friction->bending[slider];
+  const std::size_t e = sheet.hinges.size() + slider;
+  const auto first = static_cast<std::size_t>(sheet.element_start[e]), count = static_cast<std::size_t>(sheet.element_start[e + 1]) - 4 - first;
+  const double* coefficient = sheet.friction->form_coefficient.data() + b.form_begin;
+  const Eigen::Vector3d base = point(x, sheet.element_node[first]);
+  Eigen::Vector3d k = Eigen::Vector3d::Zero();
+  for (std::size_t p = 1; p < count; ++p) k += coefficient[p] * (point(x, sheet.element_node[first + p]) - base);
+  const Eigen::Vector3d u = point(x, b.normal[0]) - point(x, b.normal[1]), v = point(x, b.normal[2]) - point(x, b.normal[3]), cross = u.cross(v);
+  const double length = std::max(cross.norm(), 1e-30);
+  const Eigen::Vector3d n = cross / length;
+  const double curvature = k.dot(n);
+  if (gradient != nullptr) {
+    for (std::size_t p = 0; p < count; ++p) gradient[p] = coefficient[p] * n;
+    const Eigen::Vector3d m = (k - curvature * n) / length, by_u = v.cross(m), by_v = m.cross(u);
+    gradient[count] = by_u;
+    gradient[count + 1] = -by_u;
+    gradient[count + 2] = by_v;
+    gradient[count + 3] = -by_v;
+  }
+  return scaled(b.slider.at(curvature), b.weight);
+}
+
 }  // namespace
 
 YarnGradient yarn_gradient(const Sheet& sheet, const Points3& x, std::size_t face) {
@@ -260,9 +343,23 @@ Result<Sheet> make_sheet(const mesh::GarmentMesh& garment, const Ids& node_of_ve
   sheet.bending = compress(sheet.node_count, triplets);
   sheet.element_start.push_back(0);
   sheet.units = membrane_units(garment, sheet.fabric_of_face, bending.in_cell);
+  if (options.internal_friction) {
+    sheet.friction = make_friction(sheet, bending.curvatures);
+    for (std::size_t i = 0; i < garment.laminates.size(); ++i) sheet.fabrics[i].shear = elastic_shear(sheet.fabrics[i], garment.laminates[i].equivalent);
+  }
   for (const HingeElement& hinge : sheet.hinges) {
     sheet.element_node.insert(sheet.element_node.end(), hinge.node.begin(), hinge.node.end());
     sheet.element_start.push_back(static_cast<int>(sheet.element_node.size()));
+  }
+  if (sheet.friction) {
+    std::size_t i = 0;
+    for (const CurvatureForm& c : bending.curvatures) {
+      if (!has_slider(sheet, c)) continue;
+      for (const auto& [node, coefficient] : c.form) sheet.element_node.push_back(node);
+      const auto& normal = sheet.friction->bending[i++].normal;
+      sheet.element_node.insert(sheet.element_node.end(), normal.begin(), normal.end());
+      sheet.element_start.push_back(static_cast<int>(sheet.element_node.size()));
+    }
   }
   for (MembraneUnit& unit : sheet.units) {
     if (unit.second < 0) continue;
@@ -289,9 +386,14 @@ Result<Sheet> make_sheet(const mesh::GarmentMesh& garment, const Ids& node_of_ve
       for (int b : corner) triplets.push_back({a, b, 0});
     }
   }
+  // The turn of a slider's normal is left out of the second derivative.
+  const auto element_end = [&](std::size_t e) {
+    const bool slider = sheet.friction && e >= sheet.hinges.size() && e < sheet.hinges.size() + sheet.friction->bending.size();
+    return sheet.element_start[e + 1] - (slider ? 4 : 0);
+  };
   for (std::size_t e = 0; e + 1 < sheet.element_start.size(); ++e) {
-    for (int p = sheet.element_start[e]; p < sheet.element_start[e + 1]; ++p) {
-      for (int q = sheet.element_start[e]; q < sheet.element_start[e + 1]; ++q) triplets.push_back({sheet.element_node[static_cast<std::size_t>(p)], sheet.element_node[static_cast<std::size_t>(q)], 0});
+    for (int p = sheet.element_start[e]; p < element_end(e); ++p) {
+      for (int q = sheet.element_start[e]; q < element_end(e); ++q) triplets.push_back({sheet.element_node[static_cast<std::size_t>(p)], sheet.element_node[static_cast<std::size_t>(q)], 0});
     }
   }
   for (const Link& link : sheet.links) {
@@ -334,7 +436,8 @@ Result<Sheet> make_sheet(const mesh::GarmentMesh& garment, const Ids& node_of_ve
   for (std::size_t e = 0; e + 1 < sheet.element_start.size(); ++e) {
     for (int p = sheet.element_start[e]; p < sheet.element_start[e + 1]; ++p) {
       sheet.entry_element.push_back(static_cast<int>(e));
-      for (int q = sheet.element_start[e]; q < sheet.element_start[e + 1]; ++q) {
+      if (p >= element_end(e)) continue;
+      for (int q = sheet.element_start[e]; q < element_end(e); ++q) {
         key.push_back(find(sheet.element_node[static_cast<std::size_t>(p)], sheet.element_node[static_cast<std::size_t>(q)]));
         pairs.emplace_back(p, q);
       }
@@ -343,6 +446,7 @@ Result<Sheet> make_sheet(const mesh::GarmentMesh& garment, const Ids& node_of_ve
   std::vector<int> order;
   bucket(static_cast<int>(sheet.column.size()), key, sheet.block_pair_start, order);
   for (int i : order) sheet.block_pair.push_back(pairs[static_cast<std::size_t>(i)]);
+  read_friction(garment, sheet);
   return sheet;
 }
 
@@ -369,18 +473,19 @@ SheetEnergy energy(const Sheet& sheet, const Points3& x, const Points3& link_off
     for (std::size_t u = begin; u < end; ++u) {
       const MembraneUnit& unit = sheet.units[u];
       const auto f = static_cast<std::size_t>(unit.first);
-      const fabric::Constitutive& fabric = sheet.fabrics[static_cast<std::size_t>(sheet.fabric_of_face[f])];
       if (unit.second < 0) {
-        sum += sheet.shapes[f].area * membrane_energy(fabric, yarn_gradient(sheet, x, f));
+        const YarnState s = yarn_state(yarn_gradient(sheet, x, f));
+        sum += sheet.shapes[f].area * (weft_of_face(sheet, f, s.weft).energy + warp_of_face(sheet, f, s.warp).energy + shear_of_face(sheet, f, s.sine).energy);
         continue;
       }
       const auto g = static_cast<std::size_t>(unit.second);
       const std::array<YarnState, 2> state{yarn_state(yarn_gradient(sheet, x, f)), yarn_state(yarn_gradient(sheet, x, g))};
       const YarnState mean = mean_state(sheet, unit, state[0], state[1]);
+      const auto [weft, warp] = of_pair(sheet, u, mean);
       for (std::size_t k = 0; k < 2; ++k) {
-        sum += sheet.shapes[k == 0 ? f : g].area *
-               (own_part * (fabric.weft.at(state[k].weft - 1).energy + fabric.warp.at(state[k].warp - 1).energy) + fabric.shear.at(state[k].sine).energy +
-                (1 - own_part) * (fabric.weft.at(mean.weft - 1).energy + fabric.warp.at(mean.warp - 1).energy));
+        const std::size_t h = k == 0 ? f : g;
+        sum += sheet.shapes[h].area * (own_part * (weft_of_face(sheet, h, state[k].weft).energy + warp_of_face(sheet, h, state[k].warp).energy) +
+                                       shear_of_face(sheet, h, state[k].sine).energy + weft.energy + warp.energy);
       }
     }
     return sum;
@@ -399,6 +504,13 @@ SheetEnergy energy(const Sheet& sheet, const Points3& x, const Points3& link_off
     return sum;
   }, add);
   for (const HingeElement& hinge : sheet.hinges) result.bending += hinge_state(hinge, x, nullptr).energy;
+  if (sheet.friction) {
+    result.bending += parallel_reduce(sheet.friction->bending.size(), grain, 0.0, [&](std::size_t begin, std::size_t end) {
+      double sum = 0;
+      for (std::size_t i = begin; i < end; ++i) sum += slider_state(sheet, i, x, nullptr).energy;
+      return sum;
+    }, add);
+  }
   for (std::size_t i = 0; i < sheet.links.size(); ++i) {
     const Link& link = sheet.links[i];
     result.links += 0.5 * link.stiffness * (x.row(link.a) - x.row(link.b) - link_offset.row(static_cast<Eigen::Index>(i))).squaredNorm();
@@ -441,9 +553,10 @@ void evaluate(const Sheet& sheet, const Points3& x, const Points3& link_offset, 
     for (std::size_t u = begin; u < end; ++u) {
       const MembraneUnit& unit = sheet.units[u];
       const auto f = static_cast<std::size_t>(unit.first);
-      const fabric::Constitutive& fabric = sheet.fabrics[static_cast<std::size_t>(sheet.fabric_of_face[f])];
       if (unit.second < 0) {
-        const MembraneResponse r = membrane_response(fabric, yarn_gradient(sheet, x, f), kind);
+        const YarnGradient own = yarn_gradient(sheet, x, f);
+        const YarnState s = yarn_state(own);
+        const MembraneResponse r = membrane_response(weft_of_face(sheet, f, s.weft), warp_of_face(sheet, f, s.warp), shear_of_face(sheet, f, s.sine), own, kind);
         sum += sheet.shapes[f].area * r.energy;
         face_response(f, r);
         continue;
@@ -453,15 +566,15 @@ void evaluate(const Sheet& sheet, const Points3& x, const Points3& link_offset, 
       const std::array<YarnState, 2> state{yarn_state(gradient[0]), yarn_state(gradient[1])};
       const YarnState mean = mean_state(sheet, unit, state[0], state[1]);
       const double area = sheet.shapes[faces[0]].area + sheet.shapes[faces[1]].area;
-      const fabric::CurvePoint weft = scaled(fabric.weft.at(mean.weft - 1), 1 - own_part), warp = scaled(fabric.warp.at(mean.warp - 1), 1 - own_part);
+      const auto [weft, warp] = of_pair(sheet, u, mean);
       for (std::size_t k = 0; k < 2; ++k) {
         // The pair's force pulls on either face; its slope couples the two and goes into the elements.
-        fabric::CurvePoint own_weft = scaled(fabric.weft.at(state[k].weft - 1), own_part), own_warp = scaled(fabric.warp.at(state[k].warp - 1), own_part);
+        fabric::CurvePoint own_weft = scaled(weft_of_face(sheet, faces[k], state[k].weft), own_part), own_warp = scaled(warp_of_face(sheet, faces[k], state[k].warp), own_part);
         own_weft.force += weft.force;
         own_warp.force += warp.force;
         own_weft.energy += weft.energy;
         own_warp.energy += warp.energy;
-        const MembraneResponse r = membrane_response(own_weft, own_warp, fabric.shear.at(state[k].sine), gradient[k], kind);
+        const MembraneResponse r = membrane_response(own_weft, own_warp, shear_of_face(sheet, faces[k], state[k].sine), gradient[k], kind);
         sum += sheet.shapes[faces[k]].area * r.energy;
         face_response(faces[k], r);
         const TriangleShape& shape = sheet.shapes[faces[k]];
@@ -481,7 +594,7 @@ void evaluate(const Sheet& sheet, const Points3& x, const Points3& link_offset, 
     return sum;
   }, add);
 
-  const double element_energy = parallel_reduce(sheet.hinges.size(), grain, 0.0, [&](std::size_t begin, std::size_t end) {
+  double element_energy = parallel_reduce(sheet.hinges.size(), grain, 0.0, [&](std::size_t begin, std::size_t end) {
     double sum = 0;
     for (std::size_t e = begin; e < end; ++e) {
       const fabric::CurvePoint state = hinge_state(sheet.hinges[e], x, response.entry_gradient.data() + sheet.element_start[e]);
@@ -491,6 +604,20 @@ void evaluate(const Sheet& sheet, const Points3& x, const Points3& link_offset, 
     }
     return sum;
   }, add);
+
+  if (sheet.friction) {
+    element_energy += parallel_reduce(sheet.friction->bending.size(), grain, 0.0, [&](std::size_t begin, std::size_t end) {
+      double sum = 0;
+      for (std::size_t i = begin; i < end; ++i) {
+        const std::size_t e = sheet.hinges.size() + i;
+        const fabric::CurvePoint state = slider_state(sheet, i, x, response.entry_gradient.data() + sheet.element_start[e]);
+        sum += state.energy;
+        response.element_force[e] = state.force;
+        response.element_slope[e] = state.slope;
+      }
+      return sum;
+    }, add);
+  }
 
   const std::size_t links = sheet.links.size();
   const auto end_force = [&](int item) -> Eigen::RowVector3d {
@@ -561,6 +688,7 @@ void evaluate(const Sheet& sheet, const Points3& x, const Points3& link_offset, 
       for (int p = sheet.block_pair_start[slot]; p < sheet.block_pair_start[slot + 1]; ++p) {
         const auto [first, second] = sheet.block_pair[static_cast<std::size_t>(p)];
         const double slope = response.element_slope[static_cast<std::size_t>(sheet.entry_element[static_cast<std::size_t>(first)])];
+        if (slope == 0) continue;  // a slider that slides
         sum += slope * response.entry_gradient[static_cast<std::size_t>(first)] * response.entry_gradient[static_cast<std::size_t>(second)].transpose();
       }
       matrix.value[slot] = Block::from(sum);

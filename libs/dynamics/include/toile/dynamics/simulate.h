@@ -23,6 +23,7 @@ struct SimulationParams {
   Model model = Model::woven;
   mechanics::EdgeEstimate edge_estimate = mechanics::EdgeEstimate::van_gelder;
   mechanics::Modulus modulus = mechanics::Modulus::secant;
+  bool internal_friction = false;
   Integrator integrator = Integrator::implicit;
   std::optional<double> explicit_step;
   std::optional<double> explicit_damping;
@@ -60,6 +61,8 @@ struct SimulationParams {
     f(&SimulationParams::model, {.key = "model", .doc = "woven: membrane of yarns and plate; particle: the published springs and torques, linear (docs/mechanics.md#particle)"});
     f(&SimulationParams::edge_estimate, {.key = "edge_estimate", .doc = "model particle: springs on edges that are not along the yarns"});
     f(&SimulationParams::modulus, {.key = "modulus", .doc = "model particle: slope of the tensile curve that its springs take; secant is the published one"});
+    f(&SimulationParams::internal_friction, {.key = "internal_friction", .doc = "model woven: yes: friction between yarns in bending, shear and tension, as the loops of the fabric's tests show it (2HB, 2HG, 2HG5, RT); its state is kept "
+                                              "in the garment (docs/mechanics.md#internal-friction). no: the elastic curves alone"});
     f(&SimulationParams::integrator, {.key = "integrator", .doc = "implicit; provot: explicit, velocities then positions, constraints and contacts by dynamic constraints (docs/simulation.md#explicit-integration)"});
     f(&SimulationParams::explicit_step, {.key = "explicit_step", .doc = "integrator provot: time step; not given: two fifths of the step that is certainly stable", .unit = "s", .min = 1e-9, .max = 1});
     f(&SimulationParams::explicit_damping, {.key = "explicit_damping", .doc = "integrator provot: force against velocity per mass; not given: 10/s in equilibrium, none in motion", .unit = "1/s", .min = 0, .max = 1e5});
@@ -105,6 +108,9 @@ struct SimulationParams {
       table("gravity_factor", p.gravity_times, p.gravity_factor);
       const auto bad = [&](const char* item, const char* what, const char* remedy) { issues.push_back({"bad_combination", {.item = item}, what, remedy}); };
       if (p.integrator == Integrator::provot && p.increments > 1) bad("increments", "integrator provot runs through paths and loads in one piece", "leave increments at 1");
+      if (p.internal_friction && (p.model == Model::particle || p.integrator == Integrator::provot)) {
+        bad("internal_friction", "only model woven with an implicit integrator has friction between yarns", "leave internal_friction at no, or change model and integrator");
+      }
       for (const ConstraintSpec& c : p.constraints) {
         if (c.kind == Hold::clamp && (p.model == Model::particle || p.integrator == Integrator::provot)) {
           bad("constraints", "kind clamp holds tangent planes, which only model woven with the implicit integrator has", "hold two rows of particles with kind pin and a region");

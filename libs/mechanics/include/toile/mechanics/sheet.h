@@ -5,10 +5,12 @@
 #include "toile/base/result.h"
 #include "toile/fabric/constitutive.h"
 #include "toile/mechanics/block_matrix.h"
+#include "toile/mechanics/internal_friction.h"
 #include "toile/mechanics/membrane.h"
 #include "toile/mesh/garment_mesh.h"
 
 #include <array>
+#include <optional>
 #include <vector>
 
 namespace toile::mechanics {
@@ -53,6 +55,7 @@ struct SheetOptions {
   std::vector<int> directed_vertices;  ///< whose tangent plane gets nodes of its own (clamps)
   double link_stiffness = 500;   ///< of open seams, per node pair [N/m]
   double fastener_stiffness = 500;  ///< [N/m]
+  bool internal_friction = false;   ///< sliders with the anchors that the garment's columns have
 };
 
 /// A face by itself, or two that share an edge off the grid and stretch as one: the energy of a yarn direction is that of their
@@ -78,6 +81,7 @@ struct Sheet {
   std::vector<Spring> springs;
   std::vector<Director> directors;
   std::vector<HingeElement> hinges;
+  std::optional<InternalFriction> friction;  ///< empty: elastic
 
   // where things go (fixed gather order, so that sums do not depend on threads)
   std::vector<int> node_corner_start, node_corner;     ///< 3 * face + corner around each node
@@ -86,7 +90,8 @@ struct Sheet {
   std::vector<int> block_part_start, block_part;       ///< 9 * face + 3 * a + b per block
   std::vector<double> constant_part;                   ///< bending and links of each block, times identity [N/m]
 
-  // Elements whose energy is a function of one number: their second derivative is taken as slope * gradient gradient^T.
+  // Elements whose energy is a function of one number: their second derivative is taken as slope * gradient gradient^T. Hinges, sliders of
+  // bending, then both yarns' mean stretch of pairs.
   std::vector<int> element_start, element_node;             ///< nodes of each element; |elements| + 1, |entries|
   std::vector<int> node_entry_start, node_entry;            ///< entries of each node
   std::vector<int> block_pair_start;                        ///< per block
