@@ -45,7 +45,7 @@ int main(int argc, char** argv) {
     else if (a == "--threads") set_thread_count(std::atoi(value()));
     else if (a == "--step") params.time_step = std::atof(value());
     else if (a == "--newton") params.newton_iterations = std::atoi(value());
-    else if (a == "--newton-residual") params.newton_residual = std::atof(value());
+    else if (a == "--newton-accuracy") params.newton_accuracy = std::atof(value());
     else if (a == "--log") log = value();
     else if (a == "--card") card_file = value();
     else if (a == "--equilibrium") equilibrium = true;

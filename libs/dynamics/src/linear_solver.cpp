@@ -213,22 +213,43 @@ void LinearSolver::multiply(const BlockMatrix& matrix, const std::vector<Contact
 
 SolveReport LinearSolver::solve(const BlockMatrix& matrix, const std::vector<ContactTerm>& terms, const std::vector<Float4>& b, std::vector<Float4>& x, const SolveOptions& options) {
   const std::size_t n = b.size();
-  x.assign(n, Float4{});
   r_ = b;
   precondition(r_, z_);
-  p_ = z_;
   double rho = dot(r_, z_);
   const double start = rho;
   SolveReport report;
   if (!(start > 0)) {
+    x.assign(n, Float4{});
     report.converged = start == 0;
     return report;
   }
+  bool begun = false;
+  if (options.from_x && x.size() == n) {
+    multiply(matrix, terms, x, q_);
+    const double curvature = dot(x, q_), gain = dot(x, b);
+    begun = curvature > 0 && gain != 0;
+    if (begun) {
+      const Float4 alpha = splat(static_cast<float>(gain / curvature));
+      parallel_for(n, grain, [&](std::size_t i) {
+        x[i] *= alpha;
+        r_[i] -= alpha * q_[i];
+      });
+      precondition(r_, z_);
+      rho = dot(r_, z_);
+      report.reduction = std::sqrt(std::max(rho, 0.0) / start);
+      if (!(rho > 0) || report.reduction <= options.tolerance) {
+        report.converged = true;
+        return report;
+      }
+    }
+  }
+  if (!begun) x.assign(n, Float4{});
+  p_ = z_;
   while (report.iterations < options.max_iterations) {
     multiply(matrix, terms, p_, q_);
     const double curvature = dot(p_, q_);
     if (!(curvature > 0)) {  // rounding has used up the search space, or the matrix bends down this way
-      if (report.iterations == 0) x = p_;
+      if (report.iterations == 0 && !begun) x = p_;
       break;
     }
     const Float4 alpha = splat(static_cast<float>(rho / curvature));

@@ -33,6 +33,7 @@ const Points3 no_points(0, 3);
 constexpr double energy_slack = 1e-3;
 constexpr double slack_move = 1e-3;  // [m]
 constexpr double solver_tolerance = 0.02;
+constexpr double motion_solver_tolerance = 0.05;
 constexpr int solver_iterations_max = 300;
 // Relaxation: part of the last move that the next step starts with (until the energy rises), and the step's control.
 constexpr double momentum = 0.95;
@@ -95,6 +96,7 @@ class Run {
   void hold_nodes();
   void clear_start();
   void evaluate(const Points3& x, bool with_matrix);
+  void add_forces(const Points3& x, bool with_matrix);
   double objective(const Points3& x);
   double static_residual() const;
   double force_scale() const;
@@ -179,6 +181,7 @@ class Run {
   LinearSolver solver_;
   SolveReport solve_report_;
   double momentum_ = momentum, tolerance_ = solver_tolerance, slack_ = energy_slack;  // sharper once the relaxation stalls
+  double promised_ = 0;   // what the last direction promised to take off the energy of the step [J]
   double last_total_ = 1e300, last_left_ = 0, last_move_ = 0, last_fraction_ = 1, last_alpha_ = 1;
   std::vector<Float4> rhs_, direction_, given_, product_;
 };
@@ -448,10 +451,17 @@ void Run::evaluate(const Points3& x, bool with_matrix) {
   } else {
     mechanics::evaluate(sheet_, x, link_offset_, curvature, response_);
   }
-  gradient_ = response_.gradient - sheet_.mass * gravity_.transpose() - load_;
-  potential_ = -sheet_.mass.dot(x * gravity_) - load_.cwiseProduct(x).sum();
   phase("contact");
   contacts_ = search_->proximity(x, support_x_, {laws_.self.reach, laws_.support.reach});
+  add_forces(x, with_matrix);
+}
+
+/// The rest of an evaluation: on the sheet's response and the contacts at x, which are at hand. By itself it brings the last evaluation
+/// up to date when time or what friction remembers has changed since.
+void Run::add_forces(const Points3& x, bool with_matrix) {
+  phase("contact");
+  gradient_ = response_.gradient - sheet_.mass * gravity_.transpose() - load_;
+  potential_ = -sheet_.mass.dot(x * gravity_) - load_.cwiseProduct(x).sum();
   terms_.clear();
   contact_sums_ = add_repulsion(contacts_, x, support_x_, sheet_.area, laws_, gradient_, with_matrix ? &terms_ : nullptr);
   friction_energy_ = add_friction(friction_, start_, x, gradient_, with_matrix ? &terms_ : nullptr);
@@ -550,8 +560,19 @@ bool Run::iterate() {
   const double before = energy_ + inertia_energy(x_), scale_of_slack = force_scale();
   phase("solve");
   solver_.factor(response_.matrix, terms_, x_, fixed_);
-  solve_report_ = solver_.solve(response_.matrix, terms_, rhs_, direction_, {.tolerance = tolerance_, .max_iterations = solver_iterations_max});
+  const bool in_time = params_.mode == Mode::motion && inertia_rate_[0] > 0 && sheet_.links.empty();
+  if (in_time) {
+    // What inertia alone would do is the first guess.
+    direction_.resize(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      const Eigen::Vector3d d = (inertia_.row(static_cast<Eigen::Index>(i)) - x_.row(static_cast<Eigen::Index>(i))).transpose();
+      direction_[i] = holder_[i] < 0 ? mechanics::load3(d.data()) : Float4{};
+    }
+  }
+  solve_report_ = solver_.solve(response_.matrix, terms_, rhs_, direction_, {.tolerance = in_time ? motion_solver_tolerance : tolerance_, .max_iterations = solver_iterations_max, .from_x = in_time});
   report_.solver_iterations += solve_report_.iterations;
+  promised_ = 0;
+  for (std::size_t i = 0; i < n; ++i) promised_ += 0.5 * vector(direction_[i]).dot(vector(rhs_[i]));
   ++report_.iterations;
   phase("limit");
   for (std::size_t i = 0; i < n; ++i) {
@@ -571,7 +592,7 @@ bool Run::iterate() {
   double largest = 0;
   for (const Float4& d : direction_) largest = std::max(largest, std::sqrt(static_cast<double>(d[0]) * d[0] + static_cast<double>(d[1]) * d[1] + static_cast<double>(d[2]) * d[2]));
   if (!std::isfinite(largest)) return false;
-  const double scale = largest > params_.largest_move ? params_.largest_move / largest : 1;
+  const double scale = !in_time && largest > params_.largest_move ? params_.largest_move / largest : 1;
   Points3 target(x_.rows(), 3);
   for (std::size_t i = 0; i < n; ++i) {
     const auto row = static_cast<Eigen::Index>(i);
@@ -589,21 +610,37 @@ bool Run::iterate() {
   options.support_exempt = support_exempt_;
   const contact::StepLimit& limit = search_->limit_step(x_, target, support_x_, support_x_, options);
   last_fraction_ = limit.least_fraction;
-  const Points3 reached = limit.x;
+  Points3 reached = limit.x;
   // The straight way to `reached` is free of intersections, so every point on it is.
   double alpha = 1;
   const Points3 from = x_;
   bool moved = false;
-  for (int trial = 0; trial < 6; ++trial, alpha *= 0.5) {
-    const Points3 candidate = alpha == 1 ? reached : Points3(from + alpha * (reached - from));
-    evaluate(candidate, true);
-    const double after = energy_ + inertia_energy(candidate);
-    const double part = std::min(1.0, alpha * scale * largest / slack_move);
-    if (after <= before + slack_ * part * part * part * part * scale_of_slack + work || trial == 5) {
-      x_ = candidate;
-      moved = true;
-      break;
+  const auto shorten = [&](int trials, bool take_last) {
+    alpha = 1;
+    for (int trial = 0; trial < trials; ++trial, alpha *= 0.5) {
+      const Points3 candidate = alpha == 1 ? reached : Points3(from + alpha * (reached - from));
+      evaluate(candidate, true);
+      const double after = energy_ + inertia_energy(candidate);
+      const double part = std::min(1.0, alpha * scale * largest / slack_move);
+      moved = after <= before + slack_ * part * part * part * part * scale_of_slack + work || (take_last && trial + 1 == trials);
+      if (moved) {
+        x_ = candidate;
+        return;
+      }
     }
+  };
+  if (!in_time) {
+    shorten(6, true);
+  } else {
+    // Holding single nodes back can turn a descent into an ascent; shortening the way of all does not.
+    shorten(last_fraction_ < 1 ? 2 : 8, false);
+    if (!moved && last_fraction_ < 1) {
+      phase("limit");
+      const double part = 0.9 * search_->step_fraction(from, target, support_x_, support_x_, options);
+      reached = search_->limit_step(from, from + part * (target - from), support_x_, support_x_, options).x;
+      shorten(8, false);
+    }
+    if (!moved) evaluate(x_, true);
   }
   last_alpha_ = alpha;
   const Points3 left = gradient_ + sheet_.mass.cwiseProduct(inertia_rate_).asDiagonal() * (x_ - inertia_);
@@ -767,7 +804,7 @@ bool Run::relax() {
     iterate();
     accept();
     // Friction's slip has been carried on; the force it gives is part of the balance from here on.
-    evaluate(x_, true);
+    add_forces(x_, true);
     const double residual = static_residual();
     log_row("relaxing");
     if (hooks_.progress && params_.increments == 1) {
@@ -851,8 +888,8 @@ void Run::move_in_time() {
     evaluate(x_, true);
     bool done = false;
     for (int k = 0; k < params_.newton_iterations && !done; ++k) {
-      iterate();
-      done = last_left_ <= params_.newton_residual && held_error() <= at_target;
+      if (!iterate()) break;
+      done = last_alpha_ == 1 && promised_ <= params_.newton_accuracy * force_scale() && held_error() <= at_target;
     }
     if (!done) ++report_.unconverged_steps;
     velocity_ = (x_ - start_) / step_;

@@ -17,6 +17,7 @@ using mechanics::Float4;
 struct SolveOptions {
   double tolerance = 1e-2;  ///< on the preconditioned residual, relative to its start [1]
   int max_iterations = 400;
+  bool from_x = false;      ///< begin with the best multiple of what x holds instead of zero; the tolerance stays relative to zero's residual
 };
 
 struct SolveReport {
@@ -32,7 +33,7 @@ class LinearSolver {
   /// x      where the matrix was taken, |rows| x 3 [m]
   /// fixed  nodes that do not move, |rows|
   void factor(const BlockMatrix& matrix, const std::vector<ContactTerm>& terms, const mesh::Points3& x, const std::vector<char>& fixed);
-  /// matrix * x = b; the start is zero. matrix and terms as in factor().
+  /// matrix * x = b. matrix and terms as in factor().
   SolveReport solve(const BlockMatrix& matrix, const std::vector<ContactTerm>& terms, const std::vector<Float4>& b, std::vector<Float4>& x, const SolveOptions& options);
 
  private:

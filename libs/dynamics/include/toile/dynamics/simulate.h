@@ -36,8 +36,8 @@ struct SimulationParams {
   int increments = 1;
   double duration = 1.0;
   double time_step = 1.0 / 60;
-  int newton_iterations = 4;
-  double newton_residual = 0.02;
+  int newton_iterations = 12;
+  double newton_accuracy = 1e-3;
   double air_drag = 0.05;
   double support_reach = 2e-3;
   std::optional<double> self_reach;
@@ -78,8 +78,8 @@ struct SimulationParams {
     f(&SimulationParams::duration, {.key = "duration", .doc = "motion: simulated time; equilibrium: time of the last increment in the tables of paths and loads", .unit = "s", .min = 0, .max = 1e4});
     f(&SimulationParams::time_step, {.key = "time_step", .doc = "motion: step; equilibrium: the first step of the pseudo-time", .unit = "s", .min = 1e-6, .max = 1});
     f(&SimulationParams::newton_iterations, {.key = "newton_iterations", .doc = "motion: Newton iterations a step at most", .min = 1, .max = 1000});
-    f(&SimulationParams::newton_residual, {.key = "newton_residual", .doc = "motion: a step is done when the sum of what is left of its net forces is this part of the weight (or loads, or reactions), or after newton_iterations; the summary counts the steps that ended so",
-                                           .unit = "1", .min = 1e-9, .max = 1});
+    f(&SimulationParams::newton_accuracy, {.key = "newton_accuracy", .doc = "motion: a time step is done when one more Newton iteration promises to lower its energy by less than the weight (or loads, or reactions) times this height, or after newton_iterations; the summary counts the steps that ended so",
+                                           .unit = "m", .min = 1e-12, .max = 1});
     f(&SimulationParams::air_drag, {.key = "air_drag", .doc = "motion: force per area and velocity that slows the cloth in still air", .unit = "N*s/m3", .min = 0, .max = 100});
     f(&SimulationParams::support_reach, {.key = "support_reach", .doc = "distance from the support at which it begins to carry the cloth's middle surface", .unit = "m", .min = 1e-4, .max = 0.05});
     f(&SimulationParams::self_reach, {.key = "self_reach", .doc = "distance between middle surfaces at which cloth begins to carry cloth; not given: the thickest fabric's thickness, at least 0.8 mm",
