@@ -369,6 +369,8 @@ TEST(Simulate, NapkinOnABallMovesWithoutPenetrationAndTheSameAtAnyThreadCount) {
   set_thread_count(0);
   expect_clean(outcomes[0], ball());
   EXPECT_LT(outcomes[0].garment.x.col(1).minCoeff(), 0.05);  // it has fallen
+  EXPECT_EQ(outcomes[0].report.unconverged_steps, 0);
+  EXPECT_LT(outcomes[0].report.iterations, 150);
   for (int i = 1; i < 3; ++i) {
     EXPECT_TRUE(outcomes[static_cast<std::size_t>(i)].garment.x == outcomes[0].garment.x);
     EXPECT_TRUE(outcomes[static_cast<std::size_t>(i)].garment.vertex_columns.at("vy").reals == outcomes[0].garment.vertex_columns.at("vy").reals);

@@ -881,6 +881,10 @@ void Run::move_in_time() {
   read_velocities();
   const int steps = std::max(1, static_cast<int>(std::lround(params_.duration / params_.time_step)));
   inertia_rate_.setConstant(1 / (step_ * step_));
+  // What touches at the start sticks from the start.
+  start_ = x_;
+  evaluate(x_, false);
+  friction_ = update_friction(friction_, start_, contacts_, x_, support_x_, sheet_.area, laws_);
   for (int i = 0; i < steps && !interrupted(); ++i) {
     set_time((i + 1) * step_);
     start_ = x_;
@@ -888,8 +892,9 @@ void Run::move_in_time() {
     evaluate(x_, true);
     bool done = false;
     for (int k = 0; k < params_.newton_iterations && !done; ++k) {
-      if (!iterate()) break;
-      done = last_alpha_ == 1 && promised_ <= params_.newton_accuracy * force_scale() && held_error() <= at_target;
+      const bool moved = iterate();
+      done = promised_ <= params_.newton_accuracy * force_scale() && held_error() <= at_target;
+      if (!moved) break;
     }
     if (!done) ++report_.unconverged_steps;
     velocity_ = (x_ - start_) / step_;

@@ -148,7 +148,7 @@ struct SimulationReport {
   double least_gap = 0;           ///< [m]
   double seam_gap_max = 0;        ///< before merging; 0 once all are closed [m]
   int seams_open = 0;             ///< particle pairs not closed
-  int unconverged_steps = 0;      ///< motion: time steps whose net forces were not brought down far enough
+  int unconverged_steps = 0;      ///< motion: time steps that ended before their energy was low enough
   std::vector<Reaction> reactions;
   int start_inside = 0, start_intersections = 0;
   double start_move = 0;          ///< farthest that a particle was pushed out of the support at the start [m]
