@@ -1,0 +1,176 @@
+#include "results.h"
+#include "toile/mechanism/frame.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+using namespace toile;
+using namespace toile::mechanism;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using test::checked;
+using test::codes;
+
+namespace {
+
+/// Crank, coupler, rocker: pivots at (0,0), (0, a), (p, c), (d, 0).
+Linkage four_bar(double crank, Vector2d joint, double ground) {
+  Linkage l;
+  l.bodies = {"crank", "coupler", "rocker"};
+  l.driver = "crank";
+  l.pivots = {{{"ground", "crank"}, {0, 0}}, {{"crank", "coupler"}, {0, crank}}, {{"coupler", "rocker"}, {joint.x(), joint.y()}}, {{"rocker", "ground"}, {ground, 0}}};
+  return l;
+}
+
+std::vector<double> range(double from, double to, int count) {
+  std::vector<double> angles;
+  for (int i = 0; i <= count; ++i) angles.push_back(from + (to - from) * i / count);
+  return angles;
+}
+
+}  // namespace
+
+TEST(linkage, a_parallelogram_carries_its_coupler_without_turning_it) {
+  const Linkage l = four_bar(0.5, {0.3, 0.5}, 0.3);
+  for (const Configuration& c : checked(follow(l, range(0, -1.2, 24)))) {
+    EXPECT_NEAR(c.poses[1].angle, 0, 1e-11);
+    EXPECT_NEAR(c.poses[2].angle, c.driver, 1e-11);
+    EXPECT_NEAR(c.poses[1].shift.x(), -0.5 * std::sin(c.driver), 1e-12);
+    EXPECT_NEAR(c.poses[1].shift.y(), 0.5 * std::cos(c.driver) - 0.5, 1e-12);
+    EXPECT_LT(c.closure, 1e-12);
+    EXPECT_NEAR(c.rates[2].angle, 1, 1e-9);
+  }
+}
+
+TEST(linkage, a_four_bar_agrees_with_freudensteins_equation) {
+  const double a = 0.2, d = 0.5;
+  const Vector2d joint(0.45, 0.4);
+  const Linkage l = four_bar(a, joint, d);
+  const double b = (joint - Vector2d(0, a)).norm(), r = (joint - Vector2d(d, 0)).norm();
+  const double rocker0 = std::atan2(joint.y(), joint.x() - d);
+  for (const Configuration& c : checked(follow(l, range(0, 0.9, 30)))) {
+    const double phi = M_PI / 2 + c.driver, psi = rocker0 + c.poses[2].angle;
+    const double k1 = d / a, k2 = d / r, k3 = (a * a - b * b + r * r + d * d) / (2 * a * r);
+    EXPECT_NEAR(k1 * std::cos(psi) - k2 * std::cos(phi) + k3, std::cos(phi - psi), 1e-11);
+  }
+}
+
+TEST(linkage, rates_are_the_derivatives_of_the_poses) {
+  const Linkage l = four_bar(0.2, {0.45, 0.4}, 0.5);
+  const double e = 1e-5;
+  const auto c = checked(follow(l, {0.5 - e, 0.5, 0.5 + e}));
+  for (std::size_t b = 0; b < 3; ++b) {
+    EXPECT_NEAR((c[2].poses[b].angle - c[0].poses[b].angle) / (2 * e), c[1].rates[b].angle, 1e-7);
+    EXPECT_LT(((c[2].poses[b].shift - c[0].poses[b].shift) / (2 * e) - c[1].rates[b].shift).norm(), 1e-7);
+  }
+}
+
+TEST(linkage, there_and_back_is_where_it_began) {
+  const auto c = checked(follow(four_bar(0.2, {0.45, 0.4}, 0.5), {0.9, 0, -0.4, 0}));
+  for (const std::size_t i : {std::size_t{1}, std::size_t{3}}) {
+    for (const Pose& pose : c[i].poses) {
+      EXPECT_NEAR(pose.angle, 0, 1e-11);
+      EXPECT_LT(pose.shift.norm(), 1e-11);
+    }
+  }
+}
+
+TEST(linkage, a_dead_point_is_refused_with_its_angle) {
+  // A rocker of 0.1 m on a coupler of 0.58 m cannot follow half a turn of a crank of 0.4 m.
+  const Linkage l = four_bar(0.4, {0.5, 0.1}, 0.5);
+  const auto refused = follow(l, {-M_PI});
+  EXPECT_EQ(codes(refused), "dead_point");
+  EXPECT_NE(refused.issues()[0].what.find("deg of its driver"), std::string::npos);
+}
+
+TEST(linkage, says_what_is_wrong_with_it) {
+  Linkage l = four_bar(0.4, {0.5, 0.3}, 0.5);
+  l.pivots.pop_back();
+  EXPECT_EQ(codes(follow(l, {0.1})), "not_one_freedom");
+  l = four_bar(0.4, {0.5, 0.3}, 0.5);
+  l.pivots[2].bodies[1] = "rokcer";
+  l.driver = "ground";
+  const auto refused = follow(l, {0.1});
+  EXPECT_EQ(codes(refused), "unknown_body unknown_body");
+  EXPECT_NE(refused.issues()[0].remedy.find("rocker"), std::string::npos);
+  l = four_bar(0.4, {0.5, 0.3}, 0.5);
+  l.bodies.push_back("crank");
+  l.bodies.push_back("spare");
+  EXPECT_EQ(codes(follow(l, {0.1})), "duplicate loose_body");
+}
+
+TEST(frame, is_made_of_closed_outward_pieces) {
+  Linkage l = four_bar(0.4, {0.5, 0.3}, 0.5);
+  l.bars = {{"crank", {{0, 0}, {0.1, 0.2}, {0, 0.4}}, 0.5, 0.01, 0.02}, {"rocker", {{0.5, 0.3}, {0.5, 0}}, 0.48, 0.01, 0.02}};
+  l.bows = {{.name = "top", .body = "coupler", .at = {0.2, 0.45}, .half_width = 0.5, .crown = 0.1, .width = 0.04, .height = 0.02, .pitch = 0.3, .divisions = 64, .sides = 32}};
+  const mesh::SupportMesh frame = checked(frame_surface(l));
+  EXPECT_TRUE(mesh::validate(frame).empty());
+  EXPECT_EQ(frame.region_names, l.bodies);
+  // Each piece looks outward: the volume of a region is that of its parts. A bar keeps its height through a mitred corner.
+  const auto volume = [&](int region) {
+    double sum = 0;
+    for (Eigen::Index f = 0; f < frame.faces.rows(); ++f) {
+      if (frame.face_region[f] != region) continue;
+      const Vector3d a = frame.x.row(frame.faces(f, 0)), b = frame.x.row(frame.faces(f, 1)), c = frame.x.row(frame.faces(f, 2));
+      sum += a.dot(b.cross(c)) / 6;
+    }
+    return sum;
+  };
+  EXPECT_NEAR(volume(0), 2 * 2 * std::hypot(0.1, 0.2) * 0.01 * 0.02, 1e-12);
+  EXPECT_NEAR(volume(2), 2 * 0.3 * 0.01 * 0.02, 1e-12);
+  // The arch y = -0.1 (x / 0.5)^2 by its arc length; a section's ellipse as a polygon of 32 sides.
+  double length = 0;
+  for (int i = 0; i < 100000; ++i) {
+    const double x0 = -0.5 + i * 1e-5, x1 = x0 + 1e-5;
+    length += std::hypot(1e-5, 0.4 * (x1 * x1 - x0 * x0));
+  }
+  const double section = 0.5 * 32 * std::sin(2 * M_PI / 32) * 0.02 * 0.01;
+  EXPECT_NEAR(volume(1), section * length, 1e-3 * section * length);
+  // Landmarks run along the outer line from right to left.
+  const auto& middle = frame.landmarks.at("top_32");
+  EXPECT_NEAR(middle[0], 0, 1e-15);
+  EXPECT_NEAR(middle[1], 0.45 + 0.01 * std::cos(0.3), 1e-12);
+  EXPECT_LT(frame.landmarks.at("top_0")[0], -0.49);
+  EXPECT_GT(frame.landmarks.at("top_64")[0], 0.49);
+}
+
+TEST(frame, moves_as_rigid_bodies_by_the_poses_that_the_table_has) {
+  Linkage l = four_bar(0.4, {0.5, 0.3}, 0.5);
+  l.bars = {{"crank", {{0, 0}, {0, 0.4}}}};
+  l.bows = {{.name = "top", .body = "coupler", .at = {0.2, 0.45}}};
+  const mesh::SupportMesh frame = checked(frame_surface(l));
+  const Configuration c = checked(follow(l, {0.6})).front();
+  const mesh::SupportMesh there = moved(frame, l, c);
+  for (Eigen::Index f = 0; f < frame.faces.rows(); ++f) {
+    const RigidPose p = in_space(c.poses[static_cast<std::size_t>(frame.face_region[f])]);
+    const Eigen::Quaterniond q(p.rotation[0], p.rotation[1], p.rotation[2], p.rotation[3]);
+    for (const int v : frame.faces.row(f)) {
+      const Vector3d by_table = q * Vector3d(frame.x.row(v)) + Vector3d(p.shift[0], p.shift[1], p.shift[2]);
+      EXPECT_LT((by_table - there.x.row(v).transpose()).norm(), 1e-14);
+    }
+  }
+  // The crank's end is where the coupler begins.
+  const Vector2d end = moved(c.poses[0], {0, 0.4}), begin = moved(c.poses[1], {0, 0.4});
+  EXPECT_LT((end - begin).norm(), 1e-12);
+}
+
+TEST(frame, refuses_bars_without_a_direction) {
+  Linkage l = four_bar(0.4, {0.5, 0.3}, 0.5);
+  EXPECT_EQ(codes(frame_surface(l)), "no_surface");
+  l.bars = {{"crank", {{0, 0}, {0, 0}}}, {"crank", {{0, 0}, {0, 1}, {0, 0.5}}}};
+  EXPECT_EQ(codes(frame_surface(l)), "bad_bar bad_bar");
+  l.bars = {{"crank", {{0, 0}}}};
+  EXPECT_EQ(codes(follow(l, {0})), "bad_range");
+}
+
+TEST(motion, runs_through_its_rows) {
+  const std::vector<double> times{0, 1, 3}, angles{0, 0.5, -0.5};
+  EXPECT_EQ(angle_at(times, angles, Profile::straight, -1), 0);
+  EXPECT_EQ(angle_at(times, angles, Profile::straight, 9), -0.5);
+  EXPECT_NEAR(angle_at(times, angles, Profile::straight, 0.25), 0.125, 1e-15);
+  EXPECT_NEAR(angle_at(times, angles, Profile::smooth, 0.25), 0.5 * (3 * 0.0625 - 2 * 0.015625), 1e-15);
+  EXPECT_NEAR(angle_at(times, angles, Profile::smooth, 2), 0, 1e-15);
+}
