@@ -1,4 +1,6 @@
 #include "results.h"
+#include "toile/io/file.h"
+#include "toile/io/record_yaml.h"
 #include "toile/mechanism/frame.h"
 
 #include <gtest/gtest.h>
@@ -173,4 +175,42 @@ TEST(motion, runs_through_its_rows) {
   EXPECT_NEAR(angle_at(times, angles, Profile::straight, 0.25), 0.125, 1e-15);
   EXPECT_NEAR(angle_at(times, angles, Profile::smooth, 0.25), 0.5 * (3 * 0.0625 - 2 * 0.015625), 1e-15);
   EXPECT_NEAR(angle_at(times, angles, Profile::smooth, 2), 0, 1e-15);
+}
+
+TEST(softtop, opens_by_110_degrees_and_never_needs_longer_cloth) {
+  const std::string file = std::string(TOILE_SOURCE_DIR) + "/samples/mechanisms/softtop.yaml";
+  const Linkage top = checked(io::read_record<Linkage>(checked(io::read_file(file)), file));
+  const mesh::SupportMesh closed = checked(frame_surface(top));
+  EXPECT_TRUE(mesh::validate(closed).empty());
+  const std::vector<std::string> chain{"header", "bow1", "bow2", "bow3", "bow4", "rear_bow"};
+  const auto points = [&](const mesh::SupportMesh& frame, const std::string& bow) {
+    const auto it = std::find_if(top.bows.begin(), top.bows.end(), [&](const Bow& b) { return b.name == bow; });
+    std::vector<Vector3d> result;
+    for (const int i : {0, it->divisions / 2, it->divisions}) {
+      const auto& at = frame.landmarks.at(fmt::format("{}_{}", bow, i));
+      result.emplace_back(at[0], at[1], at[2]);
+    }
+    return result;
+  };
+  const auto way = checked(follow(top, range(0, 110 * M_PI / 180, 110)));
+  for (const Configuration& c : way) {
+    EXPECT_LT(c.closure, 1e-11);
+    EXPECT_GT(c.conditioning, 1e-3);
+    const mesh::SupportMesh frame = moved(closed, top, c);
+    for (std::size_t i = 0; i + 1 < chain.size(); ++i) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double now = (points(frame, chain[i])[k] - points(frame, chain[i + 1])[k]).norm(), then = (points(closed, chain[i])[k] - points(closed, chain[i + 1])[k]).norm();
+        EXPECT_LT(now, then + 1e-3) << chain[i] << " at " << c.driver;
+      }
+    }
+  }
+  // Folded: every bow within 0.55 m of height and 0.45 m of length.
+  Vector3d low = Vector3d::Constant(1e9), high = -low;
+  for (const std::string& bow : chain) {
+    const Vector3d p = points(moved(closed, top, way.back()), bow)[1];
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  EXPECT_LT(high.y() - low.y(), 0.55);
+  EXPECT_LT(high.z() - low.z(), 0.45);
 }
