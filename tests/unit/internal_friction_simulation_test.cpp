@@ -1,5 +1,6 @@
 // KES-F's bending test, a cantilever and a released bend with friction between the yarns, through the simulation.
 #include "cloth_fixtures.h"
+#include "toile/base/parallel.h"
 #include "toile/dynamics/simulate.h"
 
 #include <Eigen/Geometry>
@@ -21,8 +22,9 @@ fabric::Card stiff_card() {
 }
 
 SimulationParams parameters() {
+  set_thread_count(1);  // a few nodes
   SimulationParams params;
-  params.internal_friction = true;
+  params.internal_friction = YarnFriction::yes;
   params.self_reach = 1e-4;
   params.max_iterations = 3000;
   return params;

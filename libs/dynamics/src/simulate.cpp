@@ -4,10 +4,12 @@
 #include "toile/contact/exact.h"
 #include "toile/contact/search.h"
 #include "toile/contact/support_field.h"
+#include "toile/dynamics/air.h"
 #include "toile/dynamics/constraints.h"
 #include "toile/dynamics/contact_force.h"
 #include "toile/dynamics/linear_solver.h"
 #include "toile/dynamics/provot.h"
+#include "toile/dynamics/rest_neighbours.h"
 #include "toile/mechanics/sheet.h"
 
 #include <fmt/format.h>
@@ -45,6 +47,9 @@ constexpr double step_max = 2;        // [s]
 constexpr double quiet_move = 2e-4;   // below it the step grows [m]
 constexpr int stall_limit = 30;       // iterations without a better residual
 constexpr double solved_well = 0.25;  // part of the net force left after one iteration, below it the step grows
+// Places of the cloth nearer to each other within it than so many reaches do not touch: folded so tightly, cloth would lie in its own
+// thickness, and sheared or bent, neighbours come nearer in space than they are in the cloth.
+constexpr double neighbourhood = 1.5;
 // A held particle is where its path wants it [m].
 constexpr double at_target = 1e-9;
 
@@ -111,9 +116,11 @@ class Run {
   bool relax();
   void equilibria();
   void read_velocities();
+  void find_resistance(const Points3& before, const Points3& velocity_before, bool first);
   void move_in_time();
   Issues integrate_explicitly();
   void list_contacts(const Points3& x, ConstraintSet& set);
+  void find_contacts(const Points3& x, contact::Radii radii);
   void log_row(const char* phase_name);
   void record_row();
   void set_time(double time);
@@ -148,7 +155,12 @@ class Run {
   Points3 load_;          // force on each node now [N]
   double time_ = 0;       // in the tables of paths and loads [s]
   double step_ = 0;       // [s]; infinite: no inertia
-  bool damped_ = false;   // drag of the air counts
+  bool damped_ = false;   // what resists motion counts
+  // Velocities at the step's end are rate (x - origin). Resistance is coefficient * velocity against the air, with the origin moved along;
+  // a push; and the stiffness at the step's beginning against the rate of the move since then.
+  Eigen::VectorXd velocity_rate_, resistance_;  // [1/s], [N s/m]
+  Points3 velocity_origin_, resistance_origin_, push_;
+  BlockMatrix damping_;
   std::vector<FrictionPair> friction_;
   std::vector<std::uint8_t> self_exempt_, support_exempt_;
   struct Held {
@@ -175,6 +187,8 @@ class Run {
   mechanics::SheetResponse response_;
   Points3 gradient_;      // static: without inertia
   contact::Contacts contacts_;
+  RestNeighbours rest_neighbours_;
+  std::vector<contact::Contact> self_contacts_;
   ContactSums contact_sums_;
   double energy_ = 0, friction_energy_ = 0, potential_ = 0;
   std::vector<ContactTerm> terms_;
@@ -228,7 +242,7 @@ Issues Run::build(const Ids& node_of_vertex) {
   mechanics::SheetOptions options;
   options.link_stiffness = params_.seam_stiffness;
   options.directed_vertices = directed_vertices_;
-  options.internal_friction = params_.internal_friction;
+  options.internal_friction = params_.internal_friction == YarnFriction::yes;
   Result<Sheet> sheet = mechanics::make_sheet(garment_, node_of_vertex, options);
   if (!sheet) return sheet.issues();
   sheet_ = std::move(*sheet);
@@ -270,6 +284,7 @@ Issues Run::build(const Ids& node_of_vertex) {
   } else {
     search_.emplace(std::move(surface), x_);
   }
+  rest_neighbours_ = RestNeighbours(garment_, node_of_vertex, sheet_.node_count);
   velocity_ = Points3::Zero(sheet_.node_count, 3);
   friction_.clear();
   self_exempt_.clear();
@@ -438,6 +453,13 @@ void Run::clear_start() {
   start_ = x_;
 }
 
+/// Near pairs, without those of the cloth with itself that are neighbours in it.
+void Run::find_contacts(const Points3& x, contact::Radii radii) {
+  contacts_ = search_->proximity(x, support_x_, radii);
+  self_contacts_ = rest_neighbours_.without(contacts_.self, neighbourhood * laws_.self.reach);
+  contacts_.self = self_contacts_;
+}
+
 /// Energies, gradient and if asked the second derivative at x. Inertia is left to the caller.
 void Run::evaluate(const Points3& x, bool with_matrix) {
   phase("sheet");
@@ -451,8 +473,14 @@ void Run::evaluate(const Points3& x, bool with_matrix) {
   } else {
     mechanics::evaluate(sheet_, x, link_offset_, curvature, response_);
   }
+  if (damped_ && with_matrix && params_.damping_stiffness > 0) {
+    const mechanics::Float4 part = mechanics::splat(static_cast<float>(params_.damping_stiffness / step_));
+    parallel_for(damping_.value.size(), grain, [&](std::size_t k) {
+      for (int c = 0; c < 3; ++c) response_.matrix.value[k].column[c] += part * damping_.value[k].column[c];
+    });
+  }
   phase("contact");
-  contacts_ = search_->proximity(x, support_x_, {laws_.self.reach, laws_.support.reach});
+  find_contacts(x, {laws_.self.reach, laws_.support.reach});
   add_forces(x, with_matrix);
 }
 
@@ -466,10 +494,23 @@ void Run::add_forces(const Points3& x, bool with_matrix) {
   contact_sums_ = add_repulsion(contacts_, x, support_x_, sheet_.area, laws_, gradient_, with_matrix ? &terms_ : nullptr);
   friction_energy_ = add_friction(friction_, start_, x, gradient_, with_matrix ? &terms_ : nullptr);
   if (damped_) {
-    const Points3 moved = x - start_;
-    const Eigen::VectorXd rate = sheet_.area * (params_.air_drag / step_);
-    gradient_ += rate.asDiagonal() * moved;
-    friction_energy_ += 0.5 * moved.cwiseProduct(rate.asDiagonal() * moved).sum();
+    const Points3 moved = x - resistance_origin_;
+    const Eigen::VectorXd rate = resistance_.cwiseProduct(velocity_rate_);
+    gradient_ += rate.asDiagonal() * moved - push_;
+    friction_energy_ += 0.5 * moved.cwiseProduct(rate.asDiagonal() * moved).sum() - push_.cwiseProduct(x - start_).sum();
+    if (params_.damping_stiffness > 0) {
+      std::vector<Float4> by(static_cast<std::size_t>(x.rows())), force;
+      for (Eigen::Index i = 0; i < x.rows(); ++i) {
+        const Eigen::Vector3d d = (params_.damping_stiffness / step_ * (x.row(i) - start_.row(i))).transpose();
+        by[static_cast<std::size_t>(i)] = mechanics::load3(d.data());
+      }
+      multiply(damping_, {}, by, force);
+      for (Eigen::Index i = 0; i < x.rows(); ++i) {
+        const Eigen::RowVector3d f = vector(force[static_cast<std::size_t>(i)]).transpose();
+        gradient_.row(i) += f;
+        friction_energy_ += 0.5 * f.dot(x.row(i) - start_.row(i));
+      }
+    }
   }
   energy_ = response_.energy.total() + potential_ + contact_sums_.energy + friction_energy_;
   phase("other");
@@ -508,14 +549,13 @@ double Run::static_residual() const {
 bool Run::iterate() {
   const auto n = static_cast<std::size_t>(sheet_.node_count);
   rhs_.resize(n);
-  const double drag = damped_ ? params_.air_drag / step_ : 0;
   parallel_for(n, grain, [&](std::size_t i) {
     const auto row = static_cast<Eigen::Index>(i);
     const double m = sheet_.mass[row] * inertia_rate_[row];
     const Eigen::Vector3d force = -(gradient_.row(row) + m * (x_.row(row) - inertia_.row(row))).transpose();
     rhs_[i] = mechanics::load3(force.data());
     Block& d = response_.matrix.value[static_cast<std::size_t>(response_.matrix.diagonal[i])];
-    for (int c = 0; c < 3; ++c) d.column[c][c] += static_cast<float>(m + drag * sheet_.area[row]);
+    for (int c = 0; c < 3; ++c) d.column[c][c] += static_cast<float>(m + (damped_ ? resistance_[row] * velocity_rate_[row] : 0.0));
   });
   const std::vector<Float4> given = prescribed();
   bool driven = false;
@@ -873,22 +913,81 @@ void Run::read_velocities() {
   }
 }
 
+/// Resistance in the step that begins, with the coefficients of where the last steps lead to, so that they do not take an order away.
+void Run::find_resistance(const Points3& before, const Points3& velocity_before, bool first) {
+  const Eigen::Vector3d wind = factor_at(params_.wind_times, params_.wind_factor, time_) * Eigen::Vector3d(params_.wind.data());
+  AirProperties air{wind, params_.air_density, params_.wind_drag.value_or(Eigen::Vector3d(params_.wind.data()).isZero() ? 0 : 1.2), 0};
+  air.lift = params_.wind_lift.value_or(air.drag);
+  AirForces forces{Eigen::VectorXd::Zero(x_.rows()), Points3::Zero(x_.rows(), 3)};
+  if (air.drag > 0 || air.lift > 0) {
+    const Points3 v = first ? velocity_ : Points3(2 * velocity_ - velocity_before), x = first ? Points3(x_ + step_ * velocity_) : Points3(2 * x_ - before);
+    forces = air_forces(sheet_.corners, x, v, air);
+  }
+  push_ = forces.lift;
+  forces.drag += params_.air_drag * sheet_.area;
+  resistance_ = forces.drag + params_.damping_mass * sheet_.mass;
+  resistance_origin_ = velocity_origin_;
+  for (Eigen::Index i = 0; i < sheet_.cloth_nodes; ++i) {
+    if (resistance_[i] > 0) resistance_origin_.row(i) += (forces.drag[i] / (resistance_[i] * velocity_rate_[i]) * wind).transpose();
+  }
+  if (params_.damping_stiffness > 0) {
+    // Without what an evaluation of a damped step adds.
+    damped_ = false;
+    evaluate(x_, true);
+    damping_ = response_.matrix;
+  }
+}
+
+/// Euler: x = x0 + h v, v = v0 + h a. Second order: x = (4 x0 - x1)/3 + 2h/3 v, v = (4 v0 - v1)/3 + 2h/3 a, which remembers the step before.
+/// A node that touches something, or did in the last step, goes by Euler: its path has a corner.
 void Run::move_in_time() {
   gravity_part_ = 1;
   link_offset_.setZero();
   step_ = params_.time_step;
-  damped_ = params_.air_drag > 0;
   read_velocities();
   const int steps = std::max(1, static_cast<int>(std::lround(params_.duration / params_.time_step)));
-  inertia_rate_.setConstant(1 / (step_ * step_));
   // What touches at the start sticks from the start.
   start_ = x_;
   evaluate(x_, false);
   friction_ = update_friction(friction_, start_, contacts_, x_, support_x_, sheet_.area, laws_);
+  const double h = step_;
+  const auto nodes = static_cast<std::size_t>(sheet_.node_count);
+  Points3 before = x_, velocity_before = velocity_;
+  std::vector<char> touched(nodes, 0), touching(nodes, 0);
+  const auto mark = [&] {
+    touched.swap(touching);
+    touching.assign(nodes, 0);
+    const auto of = [&](std::span<const contact::Contact> contacts) {
+      for (const contact::Contact& c : contacts) {
+        if (c.distance >= laws_.of(c.kind).reach) continue;
+        const auto [first, last] = cloth_nodes(c.kind);
+        for (int k = first; k < last; ++k) touching[static_cast<std::size_t>(c.node[static_cast<std::size_t>(k)])] = 1;
+      }
+    };
+    of(contacts_.self);
+    of(contacts_.support);
+  };
+  velocity_rate_.resize(sheet_.node_count);
+  inertia_.resize(sheet_.node_count, 3);
+  velocity_origin_.resize(sheet_.node_count, 3);
   for (int i = 0; i < steps && !interrupted(); ++i) {
     set_time((i + 1) * step_);
     start_ = x_;
-    inertia_ = x_ + step_ * velocity_;
+    for (std::size_t k = 0; k < nodes; ++k) {
+      const auto row = static_cast<Eigen::Index>(k);
+      if (params_.integrator == Integrator::bdf2 && i > 0 && !touched[k] && !touching[k]) {
+        velocity_rate_[row] = 1.5 / h;
+        velocity_origin_.row(row) = (4 * x_.row(row) - before.row(row)) / 3;
+        inertia_.row(row) = velocity_origin_.row(row) + 2 * h / 9 * (4 * velocity_.row(row) - velocity_before.row(row));
+      } else {
+        velocity_rate_[row] = 1 / h;
+        velocity_origin_.row(row) = x_.row(row);
+        inertia_.row(row) = x_.row(row) + h * velocity_.row(row);
+      }
+    }
+    inertia_rate_ = velocity_rate_.cwiseAbs2();
+    find_resistance(before, velocity_before, i == 0);
+    damped_ = true;
     evaluate(x_, true);
     bool done = false;
     for (int k = 0; k < params_.newton_iterations && !done; ++k) {
@@ -897,8 +996,11 @@ void Run::move_in_time() {
       if (!moved) break;
     }
     if (!done) ++report_.unconverged_steps;
-    velocity_ = (x_ - start_) / step_;
-    mechanics::advance_friction(sheet_, x_);
+    velocity_before = velocity_;
+    before = start_;
+    velocity_ = velocity_rate_.asDiagonal() * (x_ - velocity_origin_);
+    mark();
+    mechanics::advance_friction(sheet_, x_);  // the sheet's second derivative changes with it, and the energy's zero
     friction_ = update_friction(friction_, start_, contacts_, x_, support_x_, sheet_.area, laws_);
     report_.simulated_time = (i + 1) * step_;
     log_row("moving");
@@ -914,7 +1016,7 @@ void Run::move_in_time() {
 
 /// Pairs near enough to touch before the list is made again, as unilateral constraints with their present normals.
 void Run::list_contacts(const Points3& x, ConstraintSet& set) {
-  contacts_ = search_->proximity(x, support_x_, {laws_.self.reach + contact_skin * laws_.self.reach, laws_.support.reach + contact_skin * laws_.support.reach});
+  find_contacts(x, {laws_.self.reach + contact_skin * laws_.self.reach, laws_.support.reach + contact_skin * laws_.support.reach});
   set.contacts.clear();
   contact_sums_ = {0, 0, std::max(laws_.self.reach, laws_.support.reach)};
   const auto add = [&](const contact::Contact& c) {

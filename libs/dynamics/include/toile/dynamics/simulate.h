@@ -16,14 +16,15 @@ namespace toile::dynamics {
 
 enum class Mode { equilibrium, motion };
 enum class Model { woven, particle };
-enum class Integrator { implicit, provot };
+enum class Integrator { implicit, bdf2, provot };
+enum class YarnFriction { no, yes };
 
 struct SimulationParams {
   Mode mode = Mode::equilibrium;
   Model model = Model::woven;
   mechanics::EdgeEstimate edge_estimate = mechanics::EdgeEstimate::van_gelder;
   mechanics::Modulus modulus = mechanics::Modulus::secant;
-  bool internal_friction = false;
+  YarnFriction internal_friction = YarnFriction::no;
   Integrator integrator = Integrator::implicit;
   std::optional<double> explicit_step;
   std::optional<double> explicit_damping;
@@ -39,6 +40,12 @@ struct SimulationParams {
   int newton_iterations = 12;
   double newton_accuracy = 1e-3;
   double air_drag = 0.05;
+  std::array<double, 3> wind{0, 0, 0};
+  std::vector<double> wind_times, wind_factor;
+  double air_density = 1.2;
+  std::optional<double> wind_drag, wind_lift;
+  double damping_mass = 0;
+  double damping_stiffness = 0;
   double support_reach = 2e-3;
   std::optional<double> self_reach;
   double contact_stiffness = 5e5;
@@ -63,7 +70,7 @@ struct SimulationParams {
     f(&SimulationParams::modulus, {.key = "modulus", .doc = "model particle: slope of the tensile curve that its springs take; secant is the published one"});
     f(&SimulationParams::internal_friction, {.key = "internal_friction", .doc = "model woven: yes: friction between yarns in bending, shear and tension, as the loops of the fabric's tests show it (2HB, 2HG, 2HG5, RT); its state is kept "
                                               "in the garment (docs/mechanics.md#internal-friction). no: the elastic curves alone"});
-    f(&SimulationParams::integrator, {.key = "integrator", .doc = "implicit; provot: explicit, velocities then positions, constraints and contacts by dynamic constraints (docs/simulation.md#explicit-integration)"});
+    f(&SimulationParams::integrator, {.key = "integrator", .doc = "implicit: Euler; bdf2: motion with two steps' memory, second order, hardly damps by itself; provot: explicit, velocities then positions, constraints and contacts by dynamic constraints (docs/simulation.md#explicit-integration)"});
     f(&SimulationParams::explicit_step, {.key = "explicit_step", .doc = "integrator provot: time step; not given: two fifths of the step that is certainly stable", .unit = "s", .min = 1e-9, .max = 1});
     f(&SimulationParams::explicit_damping, {.key = "explicit_damping", .doc = "integrator provot: force against velocity per mass; not given: 10/s in equilibrium, none in motion", .unit = "1/s", .min = 0, .max = 1e5});
     f(&SimulationParams::settling_time, {.key = "settling_time", .doc = "integrator provot, equilibrium: simulated time after the last row of a path, load or gravity table, after which the run ends unconverged (exit code 5)", .unit = "s", .min = 1e-6, .max = 1e4});
@@ -80,7 +87,15 @@ struct SimulationParams {
     f(&SimulationParams::newton_iterations, {.key = "newton_iterations", .doc = "motion: Newton iterations a step at most", .min = 1, .max = 1000});
     f(&SimulationParams::newton_accuracy, {.key = "newton_accuracy", .doc = "motion: a time step is done when one more Newton iteration promises to lower its energy by less than the weight (or loads, or reactions) times this height, or after newton_iterations; the summary counts the steps that ended so",
                                            .unit = "m", .min = 1e-12, .max = 1});
-    f(&SimulationParams::air_drag, {.key = "air_drag", .doc = "motion: force per area and velocity that slows the cloth in still air", .unit = "N*s/m3", .min = 0, .max = 100});
+    f(&SimulationParams::air_drag, {.key = "air_drag", .doc = "motion: force per area and velocity against the air", .unit = "N*s/m3", .min = 0, .max = 100});
+    f(&SimulationParams::wind, {.key = "wind", .doc = "motion: velocity of the air", .unit = "m/s", .min = -200, .max = 200});
+    f(&SimulationParams::wind_times, {.key = "wind_times", .doc = "times of the rows of `wind_factor`, increasing", .unit = "s"});
+    f(&SimulationParams::wind_factor, {.key = "wind_factor", .doc = "part of the wind at each of these times, straight in between; not given: 1"});
+    f(&SimulationParams::air_density, {.key = "air_density", .doc = "density of the air that drags and lifts", .unit = "kg/m3", .min = 0, .max = 1000});
+    f(&SimulationParams::wind_drag, {.key = "wind_drag", .doc = "motion: drag coefficient of a triangle across the flow; not given: 1.2 where there is wind, else 0", .unit = "1", .min = 0, .max = 10});
+    f(&SimulationParams::wind_lift, {.key = "wind_lift", .doc = "motion: lift coefficient of a triangle at an angle to the flow; not given: as wind_drag", .unit = "1", .min = 0, .max = 10});
+    f(&SimulationParams::damping_mass, {.key = "damping_mass", .doc = "motion: Rayleigh damping, force per mass and velocity", .unit = "1/s", .min = 0, .max = 1e5});
+    f(&SimulationParams::damping_stiffness, {.key = "damping_stiffness", .doc = "motion: Rayleigh damping, time by which the cloth's stiffness resists the rate of its deformation", .unit = "s", .min = 0, .max = 10});
     f(&SimulationParams::support_reach, {.key = "support_reach", .doc = "distance from the support at which it begins to carry the cloth's middle surface", .unit = "m", .min = 1e-4, .max = 0.05});
     f(&SimulationParams::self_reach, {.key = "self_reach", .doc = "distance between middle surfaces at which cloth begins to carry cloth; not given: the thickest fabric's thickness, at least 0.8 mm",
                                       .unit = "m", .min = 1e-4, .max = 0.05});
@@ -106,9 +121,15 @@ struct SimulationParams {
         }
       };
       table("gravity_factor", p.gravity_times, p.gravity_factor);
+      table("wind_factor", p.wind_times, p.wind_factor);
       const auto bad = [&](const char* item, const char* what, const char* remedy) { issues.push_back({"bad_combination", {.item = item}, what, remedy}); };
       if (p.integrator == Integrator::provot && p.increments > 1) bad("increments", "integrator provot runs through paths and loads in one piece", "leave increments at 1");
-      if (p.internal_friction && (p.model == Model::particle || p.integrator == Integrator::provot)) {
+      if (p.integrator == Integrator::bdf2 && p.mode != Mode::motion) bad("integrator", "bdf2 is for motion", "write `mode: motion`, or integrator implicit");
+      const bool wind = p.wind[0] != 0 || p.wind[1] != 0 || p.wind[2] != 0 || p.wind_drag.value_or(0) > 0 || p.wind_lift.value_or(0) > 0;
+      if ((wind || p.damping_mass > 0 || p.damping_stiffness > 0) && (p.mode != Mode::motion || p.integrator == Integrator::provot)) {
+        bad("wind", "wind and Rayleigh damping act in motion with an implicit integrator only", "write `mode: motion` with integrator bdf2 or implicit");
+      }
+      if (p.internal_friction == YarnFriction::yes && (p.model == Model::particle || p.integrator == Integrator::provot)) {
         bad("internal_friction", "only model woven with an implicit integrator has friction between yarns", "leave internal_friction at no, or change model and integrator");
       }
       for (const ConstraintSpec& c : p.constraints) {
@@ -179,7 +200,11 @@ struct toile::Choices<toile::dynamics::Model> {
 };
 template <>
 struct toile::Choices<toile::dynamics::Integrator> {
-  static constexpr std::array names{std::pair{"implicit", toile::dynamics::Integrator::implicit}, std::pair{"provot", toile::dynamics::Integrator::provot}};
+  static constexpr std::array names{std::pair{"implicit", toile::dynamics::Integrator::implicit}, std::pair{"bdf2", toile::dynamics::Integrator::bdf2}, std::pair{"provot", toile::dynamics::Integrator::provot}};
+};
+template <>
+struct toile::Choices<toile::dynamics::YarnFriction> {
+  static constexpr std::array names{std::pair{"no", toile::dynamics::YarnFriction::no}, std::pair{"yes", toile::dynamics::YarnFriction::yes}};
 };
 template <>
 struct toile::Choices<toile::mechanics::EdgeEstimate> {
