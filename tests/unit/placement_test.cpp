@@ -2,6 +2,7 @@
 
 #include "garments.h"
 #include "toile/form/form.h"
+#include "toile/geometry/wrap.h"
 #include "toile/base/parallel.h"
 #include "toile/io/ply.h"
 #include "toile/mesh/topology.h"
@@ -13,6 +14,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -731,4 +733,112 @@ TEST(place, says_when_there_is_no_arm) {
   ASSERT_FALSE(layout.has_value());
   EXPECT_EQ(layout.issues().front().code, "no_arm");
   EXPECT_NE(layout.issues().front().place.item.find("sleeve_m"), std::string::npos);
+}
+
+// ---- legs
+
+namespace {
+
+// A trunk on two legs, 0.2 m apart.
+const mesh::SupportMesh& stander() {
+  static const mesh::SupportMesh mesh = [] {
+    mesh::SupportMesh soup;
+    const auto cylinder = [&](double x, double radius, double low, double high) {
+      constexpr int n = 40;
+      const auto base = static_cast<int>(soup.x.rows()), first = static_cast<int>(soup.faces.rows());
+      soup.x.conservativeResize(base + 2 * n + 2, 3);
+      soup.faces.conservativeResize(first + 4 * n, 3);
+      for (int i = 0; i < n; ++i) {
+        const double angle = 2 * M_PI * i / n;
+        soup.x.row(base + i) << x + radius * std::sin(angle), low, radius * std::cos(angle);
+        soup.x.row(base + n + i) << x + radius * std::sin(angle), high, radius * std::cos(angle);
+        const int j = (i + 1) % n, f = first + 4 * i;
+        soup.faces.row(f) << base + i, base + j, base + n + j;
+        soup.faces.row(f + 1) << base + i, base + n + j, base + n + i;
+        soup.faces.row(f + 2) << base + 2 * n, base + j, base + i;
+        soup.faces.row(f + 3) << base + 2 * n + 1, base + n + i, base + n + j;
+      }
+      soup.x.row(base + 2 * n) << x, low, 0;
+      soup.x.row(base + 2 * n + 1) << x, high, 0;
+    };
+    cylinder(0, 0.18, 0.75, 1.3);
+    cylinder(0.1, 0.07, 0, 0.8);
+    cylinder(-0.1, 0.07, 0, 0.8);
+    const geometry::Wrap wrap = geometry::wrap(soup.x, soup.faces, 0.03, 0.004);
+    mesh::SupportMesh body;
+    body.x = wrap.x;
+    body.faces = wrap.faces;
+    body.face_region = mesh::Ids::Zero(wrap.faces.rows());
+    return body;
+  }();
+  return mesh;
+}
+
+// Two leg tubes, each of a front and a back.
+mesh::GarmentMesh leg_tubes(int nu, int nv) {
+  mesh::GarmentMesh g;
+  for (const char* name : {"front_leg_left", "back_leg_left", "front_leg_right", "back_leg_right"}) add_rectangle(g, name, nu, nv, kCell);
+  for (const int p : {0, 2}) {
+    const int a = add_seam(g, "a" + std::to_string(p)), b = add_seam(g, "b" + std::to_string(p));
+    for (int j = 0; j <= nv; ++j) g.welds.push_back({at(g, p, nu, nu, j), at(g, p + 1, nu, 0, j), a});
+    for (int j = 0; j <= nv; ++j) g.welds.push_back({at(g, p, nu, 0, j), at(g, p + 1, nu, nu, j), b});
+  }
+  return g;
+}
+
+}  // namespace
+
+TEST(body_frame, finds_two_legs_or_none) {
+  const auto frame = body_frame(stander());
+  ASSERT_TRUE(frame.has_value());
+  EXPECT_NEAR(frame->crotch, 0.75, 0.015);
+  ASSERT_TRUE(frame->leg_left && frame->leg_right);
+  for (const auto& [leg, x] : {std::pair(*frame->leg_left, 0.1), std::pair(*frame->leg_right, -0.1)}) {
+    EXPECT_GT(leg.points.size(), 65u);
+    for (const LimbPoint& point : leg.points) {
+      EXPECT_NEAR(point.centre.x(), x, 0.004);
+      // above, the ball of the wrap fills the corner between leg and trunk
+      if (point.centre.y() > 0.72) continue;
+      EXPECT_NEAR(point.girth, 2 * M_PI * 0.074, 0.02);
+    }
+    EXPECT_GT(leg.direction.dot(-Vector3d::UnitY()), 0.999);
+  }
+  const auto form = body_frame(man());
+  EXPECT_FALSE(form->leg_left || form->leg_right);
+}
+
+TEST(place, legs_go_over_legs_without_stretch) {
+  for (const double side : {1.0, -1.0}) {  // the second body is worked on as its mirror image, names stay
+    mesh::SupportMesh body = stander();
+    if (side < 0) body = mirrored(body);
+    const auto placed = place(leg_tubes(14, 30), body, {});
+    ASSERT_TRUE(placed.has_value()) << placed.issues().front().what;
+    EXPECT_TRUE(placed->findings.empty());
+    EXPECT_LT(placed->report.max_strain, 0.005);
+    EXPECT_LT(placed->report.rms_strain, 0.001);
+    EXPECT_TRUE(placed->report.self_intersections.empty());
+    EXPECT_TRUE(placed->report.support_intersections.empty());
+    EXPECT_LT(placed->report.mean_seam_gap, 0.008);
+    std::array<Vector3d, 4> middle{Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero(), Vector3d::Zero()};
+    for (Eigen::Index v = 0; v < placed->garment.vertex_count(); ++v) middle[static_cast<std::size_t>(placed->garment.vertex_panel[v])] += placed->garment.x.row(v).transpose() / (15.0 * 31.0);
+    for (std::size_t p = 0; p < 4; ++p) {
+      EXPECT_NEAR(middle[p].x(), p < 2 ? 0.11 : -0.11, 0.03);
+      EXPECT_GT((p % 2 == 0 ? 1 : -1) * middle[p].z(), 0.03);
+    }
+  }
+}
+
+TEST(place, says_when_legs_are_missing_unknown_or_too_thick) {
+  const auto missing = place(leg_tubes(14, 10), man(), {});
+  ASSERT_FALSE(missing.has_value());
+  EXPECT_EQ(codes(missing.issues()), std::vector<std::string>(4, "no_legs"));
+  const auto narrow = place(leg_tubes(10, 10), stander(), {});
+  ASSERT_FALSE(narrow.has_value());
+  EXPECT_EQ(codes(narrow.issues()), std::vector<std::string>(2, "too_narrow"));
+  auto g = leg_tubes(14, 10);
+  g.panels[0].name = g.panels[0].piece = "front_leg";
+  g.panels[1].name = g.panels[1].piece = "back_leg";
+  const auto unknown = place(g, stander(), {});
+  ASSERT_FALSE(unknown.has_value());
+  EXPECT_EQ(codes(unknown.issues()), std::vector<std::string>(2, "no_region"));
 }

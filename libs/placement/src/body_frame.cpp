@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -17,6 +18,8 @@ using geometry::Polyline;
 
 constexpr double kStep = 0.01;         // between sections [m]
 constexpr double kArmJump = 1.12;      // the trunk's width grows by more than this over 5 mm where the arms join
+constexpr double kSmallestLeg = 0.15;  // girth below which a curve beside the middle is no leg [m]
+constexpr std::size_t kLegSections = 8;  // shorter legs are none
 constexpr double kSmallestLimb = 0.08; // girth below which a curve is a finger, an ear or a crumb of the mesh [m]
 
 struct Curve {
@@ -168,6 +171,40 @@ std::optional<Limb> find_arm(const mesh::SupportMesh& support, const BodyFrame& 
   return limb;
 }
 
+// Follows the legs down from the crotch: the curve next to the middle on either side, as long as there are both.
+void find_legs(const mesh::SupportMesh& support, BodyFrame& frame) {
+  std::array<Limb, 2> legs;  // right, left
+  for (double y = frame.crotch - kStep; y > frame.bottom + 0.002; y -= kStep) {
+    const auto curves = horizontal(support, y);
+    std::array<std::optional<LimbPoint>, 2> found;
+    for (const std::size_t i : {std::size_t{0}, std::size_t{1}}) {
+      const double side = i == 0 ? -1 : 1;
+      const Curve* nearest = nullptr;
+      for (const Curve& curve : curves) {
+        if (side * (curve.centroid.x() - frame.x_mid) <= 0 || geometry::tape_girth(curve.points, Eigen::Vector3d::UnitY()) < kSmallestLeg) continue;
+        if (!nearest || std::abs(curve.centroid.x() - frame.x_mid) < std::abs(nearest->centroid.x() - frame.x_mid)) nearest = &curve;
+      }
+      if (!nearest) continue;
+      LimbPoint point;
+      point.centre = 0.5 * (nearest->points.colwise().maxCoeff() + nearest->points.colwise().minCoeff()).transpose();
+      point.girth = geometry::tape_girth(nearest->points, Eigen::Vector3d::UnitY());
+      for (Eigen::Index k = 0; k < nearest->points.rows(); ++k) point.radius = std::max(point.radius, (nearest->points.row(k).transpose() - point.centre).norm());
+      // into the foot
+      if (!legs[i].points.empty() && (point.girth > 1.15 * legs[i].points.back().girth || (point.centre - legs[i].points.back().centre).norm() > 0.03)) continue;
+      found[i] = point;
+    }
+    if (!found[0] || !found[1]) break;
+    for (const std::size_t i : {std::size_t{0}, std::size_t{1}}) legs[i].points.push_back(*found[i]);
+  }
+  if (legs[0].points.size() < kLegSections) return;
+  for (Limb& leg : legs) {
+    leg.origin = leg.points.front().centre;
+    leg.direction = (leg.points.back().centre - leg.origin).normalized();
+  }
+  frame.leg_right = std::move(legs[0]);
+  frame.leg_left = std::move(legs[1]);
+}
+
 }  // namespace
 
 const Section& BodyFrame::section(double y) const {
@@ -313,6 +350,7 @@ Result<BodyFrame> body_frame(const mesh::SupportMesh& support) {
     frame.arm_left = find_arm(support, frame, 1, half);
     frame.arm_right = find_arm(support, frame, -1, half);
   }
+  find_legs(support, frame);
   return frame;
 }
 

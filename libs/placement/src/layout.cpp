@@ -96,14 +96,16 @@ Extent extent_of(const mesh::GarmentMesh& garment, const FoldedFlat& flat, int p
   return e;
 }
 
-bool on_trunk(Region region) { return region != Region::arm && region != Region::arm_left && region != Region::arm_right && region != Region::attached; }
 bool on_arm(Region region) { return region == Region::arm || region == Region::arm_left || region == Region::arm_right; }
+bool on_leg(Region region) { return region == Region::leg || region == Region::leg_left || region == Region::leg_right; }
+bool on_trunk(Region region) { return !on_arm(region) && !on_leg(region) && region != Region::attached; }
 
 // A first idea from the name of the panel or of its piece.
 Region region_from_name(const std::string& name) {
   const auto has = [&](const char* word) { return name.find(word) != std::string::npos; };
   if (has("collar") || has("hood") || has("neckband") || has("stand")) return Region::attached;
   if (has("sleeve") || has("cuff")) return Region::arm;
+  if (has("leg") || has("trouser")) return Region::leg;
   if (has("waistband") || has("band") || has("belt")) return Region::waist;
   if (has("front")) return Region::torso_front;
   if (has("back")) return Region::torso_back;
@@ -146,6 +148,19 @@ Vector2d PanelLayout::operator()(const Vector2d& uv) const {
   return Vector2d(c * uv.x() - s * uv.y(), s * uv.x() + c * uv.y()) + shift;
 }
 
+PlaceParams with_named_legs(const mesh::GarmentMesh& garment, PlaceParams params) {
+  for (const mesh::Panel& panel : garment.panels) {
+    const auto known = params.panels.find(panel.name);
+    Region region = known == params.panels.end() ? Region::automatic : known->second.region;
+    if (region == Region::automatic) region = region_from_name(panel.name);
+    if (region == Region::automatic) region = region_from_name(panel.piece);
+    if (region != Region::leg) continue;
+    if (panel.name.find("left") != std::string::npos) params.panels[panel.name].region = Region::leg_left;
+    else if (panel.name.find("right") != std::string::npos) params.panels[panel.name].region = Region::leg_right;
+  }
+  return params;
+}
+
 Result<Layout> make_layout(const mesh::GarmentMesh& garment, const FoldedFlat& flat, const mesh::SupportMesh& support, const BodyFrame& frame, const PlaceParams& params) {
   Issues issues;
   const int count = static_cast<int>(garment.panels.size());
@@ -174,7 +189,7 @@ Result<Layout> make_layout(const mesh::GarmentMesh& garment, const FoldedFlat& f
     if (panel.region == Region::automatic && count == 1) panel.region = Region::torso;
     if (panel.region == Region::automatic) {
       issues.push_back({.code = "no_region", .place = {.item = panel_name(p)}, .what = "its name does not say which part of the body it goes on",
-                        .remedy = "give panels." + names[static_cast<std::size_t>(p)] + ".region (torso_front, torso_back, torso, waist, arm, ...)"});
+                        .remedy = "give panels." + names[static_cast<std::size_t>(p)] + ".region (torso_front, torso_back, torso, waist, arm, leg, ...)"});
     }
   }
   if (!issues.empty()) return issues;
@@ -445,7 +460,7 @@ Result<Layout> make_layout(const mesh::GarmentMesh& garment, const FoldedFlat& f
       for (const Join& join : joins) {
         for (const auto& [self, other, second] : {std::tuple(join.a, join.b, true), std::tuple(join.b, join.a, false)}) {
           const PanelLayout &mine = layout.panels[static_cast<std::size_t>(self)], &theirs = layout.panels[static_cast<std::size_t>(other)];
-          if (!join.sewn() || self == other || !on_arm(mine.region) || theirs.region == Region::attached || side[static_cast<std::size_t>(self)] != 0) continue;
+          if (!join.sewn() || self == other || !on_arm(mine.region) || theirs.region == Region::attached || on_leg(theirs.region) || side[static_cast<std::size_t>(self)] != 0) continue;
           if (on_arm(theirs.region)) {
             if (side[static_cast<std::size_t>(other)] == 0) continue;
             next[static_cast<std::size_t>(self)] += (side[static_cast<std::size_t>(other)] > 0 ? 1e-3 : -1e-3);
@@ -483,14 +498,61 @@ Result<Layout> make_layout(const mesh::GarmentMesh& garment, const FoldedFlat& f
       }
     }
   }
+  // Legs: which one, from the name, the side of the trunk, or the panels of a leg that it is sewn to.
+  {
+    std::vector<double> side(static_cast<std::size_t>(count), 0);
+    const double girth = layout.girth_trunk > 0 ? layout.girth_trunk : 1.0;
+    for (int p = 0; p < count; ++p) {
+      const Region region = layout.panels[static_cast<std::size_t>(p)].region;
+      if (region == Region::leg_left) side[static_cast<std::size_t>(p)] = 1;
+      if (region == Region::leg_right) side[static_cast<std::size_t>(p)] = -1;
+    }
+    for (int round = 0; round < count; ++round) {
+      std::vector<double> next = side;
+      for (const Join& join : joins) {
+        for (const auto& [self, other, second] : {std::tuple(join.a, join.b, true), std::tuple(join.b, join.a, false)}) {
+          const PanelLayout& theirs = layout.panels[static_cast<std::size_t>(other)];
+          if (!join.sewn() || self == other || !on_leg(layout.panels[static_cast<std::size_t>(self)].region) || side[static_cast<std::size_t>(self)] != 0) continue;
+          if (!on_leg(theirs.region) && !on_trunk(theirs.region)) continue;
+          for (const auto& [va, vb] : join.pairs) {
+            if (on_leg(theirs.region)) {
+              next[static_cast<std::size_t>(self)] += side[static_cast<std::size_t>(other)] == 0 ? 0 : std::copysign(1.0, side[static_cast<std::size_t>(other)]);
+            } else {
+              double a = theirs(uv_of(flat, second ? vb : va)).x() / girth;
+              a -= std::floor(a);
+              next[static_cast<std::size_t>(self)] += a < 0.5 ? 1 : -1;
+            }
+          }
+        }
+      }
+      if (next == side) break;
+      side = next;
+    }
+    for (int p = 0; p < count; ++p) {
+      PanelLayout& panel = layout.panels[static_cast<std::size_t>(p)];
+      if (!on_leg(panel.region)) continue;
+      if (!frame.leg_left) {
+        issues.push_back({.code = "no_legs", .place = {.item = panel_name(p)}, .what = "the support has no legs to put it on",
+                          .remedy = "give a body with legs apart below the crotch (a dress form ends under the seat), or leave the panel out"});
+        continue;
+      }
+      if (side[static_cast<std::size_t>(p)] == 0) {
+        issues.push_back({.code = "no_region", .place = {.item = panel_name(p)}, .what = "neither its name nor its seams say which leg it goes on",
+                          .remedy = "give panels." + names[static_cast<std::size_t>(p)] + ".region: leg_left or leg_right"});
+        continue;
+      }
+      panel.region = side[static_cast<std::size_t>(p)] > 0 ? Region::leg_left : Region::leg_right;
+      panel.part = panel.region == Region::leg_left ? Part::leg_left : Part::leg_right;
+    }
+  }
   if (!issues.empty()) return issues;
-  for (const Part part : {Part::arm_left, Part::arm_right}) {
+  for (const Part part : {Part::arm_left, Part::arm_right, Part::leg_left, Part::leg_right}) {
     std::vector<int> members;
     for (int p = 0; p < count; ++p) {
       const PanelLayout& panel = layout.panels[static_cast<std::size_t>(p)];
-      if (on_arm(panel.region) && panel.part == part) members.push_back(p);
+      if (panel.part == part) members.push_back(p);
     }
-    double& girth = part == Part::arm_left ? layout.girth_arm_left : layout.girth_arm_right;
+    double& girth = part == Part::arm_left ? layout.girth_arm_left : part == Part::arm_right ? layout.girth_arm_right : part == Part::leg_left ? layout.girth_leg_left : layout.girth_leg_right;
     std::vector<int> rest = members;
     while (!rest.empty()) {
       // the widest panel first
@@ -502,6 +564,20 @@ Result<Layout> make_layout(const mesh::GarmentMesh& garment, const FoldedFlat& f
       const auto group = lay_out(rest, root, g);
       girth = std::max(girth, g);
       std::erase_if(rest, [&](int p) { return group.count(p) > 0; });
+      if (part != Part::leg_left && part != Part::leg_right) continue;
+      // Round the leg: the panel that is called front (back) to the front (back); without one, the middle of the strip to the outside.
+      double low = 1e9, high = -1e9;
+      std::optional<double> front;
+      const double round = g > 0 ? g : 1.0;
+      for (int p : group) {
+        const Extent e = extent_of(garment, flat, p, layout.panels[static_cast<std::size_t>(p)]);
+        low = std::min(low, e.low.x());
+        high = std::max(high, e.high.x());
+        if (names[static_cast<std::size_t>(p)].find("front") != std::string::npos) front = e.centre().x();
+        else if (!front && names[static_cast<std::size_t>(p)].find("back") != std::string::npos) front = e.centre().x() - 0.5 * round;
+      }
+      const double outside = part == Part::leg_left ? 0.25 : -0.25;
+      shift_group(group, {front ? -*front : outside * round - 0.5 * (low + high), 0});
     }
     for (int p : members) {
       if (const PanelSpec* spec = specs[static_cast<std::size_t>(p)]) layout.panels[static_cast<std::size_t>(p)].shift += Vector2d(spec->shift[0], spec->shift[1]);

@@ -17,6 +17,8 @@ Region mirrored(Region region) {
     case Region::torso_right: return Region::torso_left;
     case Region::arm_left: return Region::arm_right;
     case Region::arm_right: return Region::arm_left;
+    case Region::leg_left: return Region::leg_right;
+    case Region::leg_right: return Region::leg_left;
     default: return region;
   }
 }

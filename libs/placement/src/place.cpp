@@ -274,7 +274,7 @@ std::vector<int> orders(const mesh::GarmentMesh& garment) {
 std::vector<double> sheets(const mesh::GarmentMesh& garment, const FoldedFlat& folded, const Layout& layout) {
   std::vector<double> result(folded.layer.size(), 0);
   const std::vector<int> order = orders(garment);
-  for (const Part part : {Part::trunk, Part::arm_left, Part::arm_right}) {
+  for (const Part part : {Part::trunk, Part::arm_left, Part::arm_right, Part::leg_left, Part::leg_right}) {
     std::map<int, std::pair<double, double>> range;  // by order: least and greatest layer
     for (Eigen::Index v = 0; v < garment.vertex_count(); ++v) {
       const auto p = static_cast<std::size_t>(garment.vertex_panel[v]);
@@ -518,6 +518,82 @@ Result<Start> bend(const mesh::GarmentMesh& garment, const FoldedFlat& folded, c
       if (edge > -1e8) needed = std::min(needed, along - margin - edge);
     }
     for (const Eigen::Index v : members) start.x.row(v) = tube(flat[static_cast<std::size_t>(v)], needed, sheet[static_cast<std::size_t>(v)]).transpose();
+  }
+  // Legs: a straight tube along the leg whose section is the hull of the leg, enlarged away from the other leg to the girth of the
+  // panels, below whatever hangs on the trunk.
+  for (const Part part : {Part::leg_left, Part::leg_right}) {
+    const double girth = part == Part::leg_left ? layout.girth_leg_left : layout.girth_leg_right;
+    const std::optional<Limb>& limb = part == Part::leg_left ? frame.leg_left : frame.leg_right;
+    const double side = part == Part::leg_left ? 1 : -1;
+    std::vector<Eigen::Index> members;
+    double h_low = 1e9, h_high = -1e9;
+    for (Eigen::Index v = 0; v < n; ++v) {
+      if (part_of(v) != part) continue;
+      members.push_back(v);
+      h_low = std::min(h_low, flat[static_cast<std::size_t>(v)].y());
+      h_high = std::max(h_high, flat[static_cast<std::size_t>(v)].y());
+    }
+    if (members.empty()) continue;
+    TOILE_CHECK(limb.has_value(), "part {}", static_cast<int>(part));
+    const Vector3d up = -limb->direction;
+    const Vector3d front = (Vector3d::UnitZ() - up.z() * up).normalized(), left = up.cross(front);
+    double top = 0;  // along `up` from the leg's origin
+    if (low < high) top = std::min(top, low - kSheet - 0.01 - limb->origin.y());
+    const double slide = top - h_high;
+    double worst = 0;
+    std::optional<Issue> narrow;
+    std::vector<Vector3d> outline;  // of the leg, seen along it
+    for (const LimbPoint& point : limb->points) {
+      const double h = (point.centre - limb->origin).dot(up) - slide;
+      if (h < h_low - 0.01 || h > h_high + 0.01) continue;
+      const Section& section = frame.section(point.centre.y());
+      for (Eigen::Index i = 0; i < section.hull.rows(); ++i) {
+        const Vector3d d = Vector3d(section.hull(i, 1), section.y, section.hull(i, 0)) - limb->origin;
+        if (side * (section.hull(i, 1) - frame.x_mid) > 0) outline.emplace_back(d.dot(left), 0, d.dot(front));
+      }
+      // The hull of both legs leaves the inner sides out.
+      for (int k = 0; k < 24; ++k) {
+        const double angle = 2 * std::numbers::pi * k / 24, r = point.girth / (2 * std::numbers::pi);
+        const Vector3d d = point.centre - limb->origin;
+        outline.emplace_back(d.dot(left) + r * std::sin(angle), 0, d.dot(front) + r * std::cos(angle));
+      }
+      if (girth <= 0 || h < h_low + 0.005 || h > h_high - 0.005) continue;
+      std::vector<int> panels;
+      double width = 0;
+      for (const double off : {0.0, -0.02, 0.02}) width = std::max(width, width_at(garment, layout, flat, part, h + off, &panels));
+      const double needed = point.girth + 2 * std::numbers::pi * params.clearance;
+      if (needed / std::max(width, 1e-6) > std::max(1 + kNarrow, worst)) {
+        worst = needed / std::max(width, 1e-6);
+        narrow = too_narrow(garment, panels, width, needed, fmt::format("the leg at height {:.2f} m", point.centre.y()));
+      }
+    }
+    if (narrow) issues.push_back(*narrow);
+    if (outline.empty()) {
+      issues.push_back({.code = "off_support", .place = {.item = "panels of a leg"}, .what = "they would lie where the support has no leg",
+                        .remedy = "check their shift and the units of pattern and support"});
+    }
+    if (!issues.empty()) continue;
+    Points3 all(static_cast<Eigen::Index>(outline.size()), 3);
+    for (std::size_t i = 0; i < outline.size(); ++i) all.row(static_cast<Eigen::Index>(i)) = outline[i].transpose();
+    const Points3 hull = geometry::convex_hull(all, Vector3d::UnitY());
+    Points2 section(hull.rows(), 2);
+    section.col(0) = hull.col(2);
+    section.col(1) = hull.col(0);
+    // Enlarged about its point next to the other leg: that stays where it is, so that the two tubes keep apart.
+    Eigen::Index inner = 0;
+    (side * section.col(1)).minCoeff(&inner);
+    const Vector2d hold = section.row(inner).transpose();
+    const double margin = params.offset;
+    const double size = girth > 0 ? (girth - 2 * std::numbers::pi * margin) / polygon_perimeter(section) : 1;
+    for (Eigen::Index i = 0; i < section.rows(); ++i) section.row(i) = (hold + size * (section.row(i).transpose() - hold)).transpose();
+    const Vector2d middle = 0.5 * (section.colwise().minCoeff() + section.colwise().maxCoeff()).transpose();
+    std::map<double, ConvexSection> curves;
+    for (const Eigen::Index v : members) {
+      const double level = sheet[static_cast<std::size_t>(v)];
+      const ConvexSection& curve = curves.try_emplace(level, section, margin + kSheet * level, middle, Vector2d(1, 0)).first->second;
+      const Vector2d at = curve.point(flat[static_cast<std::size_t>(v)].x());
+      start.x.row(v) = (limb->origin + at.y() * left + at.x() * front + (flat[static_cast<std::size_t>(v)].y() + slide) * up).transpose();
+    }
   }
   if (!issues.empty()) return issues;
   return start;
@@ -772,8 +848,9 @@ Result<Placed> place_as_given(const mesh::GarmentMesh& sewn, const mesh::Support
 
 // Work is done on one of the two mirror images, so that a mirrored garment on a mirrored support gives the mirrored result
 // to the last bit.
-Result<Placed> place(const mesh::GarmentMesh& sewn, const mesh::SupportMesh& support, const PlaceParams& params, const std::function<void(double)>& progress) {
-  if (!params.lines.empty()) return place_on_frame(sewn, support, params, progress);
+Result<Placed> place(const mesh::GarmentMesh& sewn, const mesh::SupportMesh& support, const PlaceParams& given, const std::function<void(double)>& progress) {
+  if (!given.lines.empty()) return place_on_frame(sewn, support, given, progress);
+  const PlaceParams params = with_named_legs(sewn, given);
   if (!left_handed(support)) return place_as_given(sewn, support, params, progress);
   TOILE_TRY(Placed placed, place_as_given(mirrored(sewn), mirrored(support), mirrored(params), progress));
   const Points3 x = mirrored(placed.garment).x;

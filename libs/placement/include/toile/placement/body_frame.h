@@ -47,6 +47,7 @@ struct BodyFrame {
   double neck = 0;                 ///< of the smallest girth above the shoulders [m]
   std::vector<Section> sections;   ///< upwards, every 10 mm from bottom to neck
   std::optional<Limb> arm_left, arm_right;  ///< left is at +x
+  std::optional<Limb> leg_left, leg_right;  ///< both or none; their points are the middles of horizontal sections
   std::map<std::string, Eigen::Vector3d> landmarks;  ///< of the support, and what was found (body_levels names)
 
   /// Section nearest to a height.

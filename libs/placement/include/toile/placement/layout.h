@@ -1,4 +1,4 @@
-// Where panels go before they are bent: every panel gets a part of the support (trunk or arm) and a rigid motion into
+// Where panels go before they are bent: every panel gets a part of the support (trunk, arm or leg) and a rigid motion into
 // the unrolled surface of that part, found from its seams.
 #pragma once
 
@@ -14,10 +14,10 @@
 
 namespace toile::placement {
 
-enum class Part { trunk, arm_left, arm_right, attached };
+enum class Part { trunk, arm_left, arm_right, leg_left, leg_right, attached };
 
 /// Rigid motion of a panel into the unrolled tube of its part: a [m] runs round it (from the front to the body's left on
-/// the trunk), h [m] along it (up on the trunk, inwards to the shoulder on an arm).
+/// the trunk), h [m] along it (up on the trunk, inwards to the shoulder on an arm, up on a leg).
 struct PanelLayout {
   Part part = Part::trunk;
   Region region = Region::automatic;  ///< as resolved; never automatic
@@ -30,11 +30,15 @@ struct Layout {
   std::vector<PanelLayout> panels;           ///< by panel id
   double girth_trunk = 0;                    ///< what the panels measure round the trunk, seam to seam [m]; 0: open
   double girth_arm_left = 0, girth_arm_right = 0;
+  double girth_leg_left = 0, girth_leg_right = 0;
   std::vector<int> shoulder_welds;           ///< rows of welds between front and back that run over a shoulder
 };
 
+/// The settings with the leg (left or right) that names of leg panels say. A garment is mirrored after this, its names are not.
+PlaceParams with_named_legs(const mesh::GarmentMesh& garment, PlaceParams params);
+
 /// error  Issues "no_region" (panels whose part of the support is not known), "unknown_panel" (a setting for a panel
-///        that is not there), "no_arm", "unknown_anchor"
+///        that is not there), "no_arm", "no_legs", "unknown_anchor"
 Result<Layout> make_layout(const mesh::GarmentMesh& garment, const FoldedFlat& flat, const mesh::SupportMesh& support, const BodyFrame& frame, const PlaceParams& params);
 
 }  // namespace toile::placement

@@ -24,6 +24,9 @@ enum class Region {
   arm,          ///< round the arm that its seams to the trunk's panels say
   arm_left,
   arm_right,
+  leg,          ///< round the leg that its name or its seams say
+  leg_left,
+  leg_right,
   attached,  ///< stands on its seams to panels that are placed before it (collars, hoods)
 };
 
@@ -36,7 +39,8 @@ struct toile::Choices<toile::placement::Region> {
       std::pair{"auto", R::automatic},         std::pair{"torso_front", R::torso_front}, std::pair{"torso_back", R::torso_back},
       std::pair{"torso_left", R::torso_left},  std::pair{"torso_right", R::torso_right}, std::pair{"torso", R::torso},
       std::pair{"waist", R::waist},            std::pair{"arm", R::arm},                 std::pair{"arm_left", R::arm_left},
-      std::pair{"arm_right", R::arm_right},    std::pair{"attached", R::attached}};
+      std::pair{"arm_right", R::arm_right},    std::pair{"leg", R::leg},                 std::pair{"leg_left", R::leg_left},
+      std::pair{"leg_right", R::leg_right},    std::pair{"attached", R::attached}};
 };
 
 namespace toile::placement {
