@@ -14,6 +14,8 @@ const char* name_of(placement::Part part) {
   switch (part) {
     case placement::Part::arm_left: return "arm_left";
     case placement::Part::arm_right: return "arm_right";
+    case placement::Part::leg_left: return "leg_left";
+    case placement::Part::leg_right: return "leg_right";
     case placement::Part::attached: return "attached";
     default: return "trunk";
   }
