@@ -146,6 +146,61 @@ TEST(form, regions_are_where_they_are_called) {
   EXPECT_EQ(made(man(), p).mesh.region_names, (std::vector<std::string>{"torso", "neck"}));
 }
 
+TEST(form, legs_measure_as_asked_and_stand_apart) {
+  for (const auto sex : {form::Sex::male, form::Sex::female}) {
+    SCOPED_TRACE(sex == form::Sex::female);
+    form::Measurements m = sex == form::Sex::male ? man() : woman();
+    m.inseam = sex == form::Sex::male ? 0.815 : 0.76;
+    m.upperLeg = 0.57, m.knee = 0.385, m.ankle = 0.24;
+    form::FormParams p;
+    p.sex = sex, p.legs = true, p.arms = sex == form::Sex::male, p.vertices = 5000;
+    const form::Form f = made(m, p);
+    expect_sound(f, p);
+    std::set<std::string> answered;
+    for (const form::GaugeRow& row : f.gauge) {
+      answered.insert(row.name);
+      if (row.girth) EXPECT_LT(std::abs(row.difference), 3e-4) << row.name;
+    }
+    for (const char* name : {"upperLeg", "knee", "ankle", "inseam"}) EXPECT_TRUE(answered.count(name)) << name;
+    const auto& names = f.mesh.region_names;
+    ASSERT_EQ(names[names.size() - 2], "leg_left");
+    ASSERT_EQ(names.back(), "leg_right");
+    std::array<int, 2> count{};
+    for (Eigen::Index t = 0; t < f.mesh.faces.rows(); ++t) {
+      const Eigen::Vector3d c = (f.mesh.x.row(f.mesh.faces(t, 0)) + f.mesh.x.row(f.mesh.faces(t, 1)) + f.mesh.x.row(f.mesh.faces(t, 2))).transpose() / 3;
+      const int leg = f.mesh.face_region[t] - static_cast<int>(names.size()) + 2;
+      EXPECT_EQ(leg >= 0, c.y() < *m.inseam - 1e-4 || (leg >= 0 && c.y() < *m.inseam + 1e-4));
+      if (leg < 0) continue;
+      ++count[static_cast<std::size_t>(leg)];
+      EXPECT_GT((leg == 0 ? 1 : -1) * c.x(), 0);
+    }
+    EXPECT_EQ(count[0], count[1]);
+    EXPECT_NEAR(f.mesh.landmarks.at("crotch")[1], *m.inseam, 3e-4);
+    EXPECT_GT(f.mesh.landmarks.at("ankle_left")[0], 0.1);
+    // a hand's breadth under the crotch there is air between the thighs
+    double nearest = 1;
+    for (Eigen::Index v = 0; v < f.mesh.x.rows(); ++v) {
+      if (f.mesh.x(v, 1) < *m.inseam - 0.06) nearest = std::min(nearest, std::abs(f.mesh.x(v, 0)));
+    }
+    EXPECT_GT(nearest, 0.008);
+  }
+}
+
+TEST(form, legs_need_their_measurements) {
+  form::FormParams p;
+  p.legs = true;
+  const auto none = form::make_form(man(), p);
+  ASSERT_FALSE(none.has_value());
+  ASSERT_EQ(none.issues().size(), 4u);
+  EXPECT_EQ(none.issues().front().code, "missing_measurement");
+  EXPECT_EQ(none.issues().front().place.item, "inseam");
+  form::Measurements m = man();
+  m.inseam = 0.815, m.upperLeg = 0.9, m.knee = 0.385, m.ankle = 0.24;
+  const auto thick = form::make_form(m, p);
+  ASSERT_FALSE(thick.has_value());
+  EXPECT_EQ(thick.issues().front().place.item, "upperLeg");
+}
+
 TEST(form, must_fail) {
   struct Row {
     const char* what;

@@ -33,6 +33,9 @@ std::vector<Target> targets(const Measurements& m, const FormParams& params) {
     t.push_back({"shoulderToElbow", false, m.shoulderToElbow});
     t.push_back({"shoulderToWrist", false, m.shoulderToWrist});
   }
+  if (params.legs) {
+    for (const Target& leg : {Target{"upperLeg", true, *m.upperLeg}, Target{"knee", true, *m.knee}, Target{"ankle", true, *m.ankle}, Target{"inseam", false, *m.inseam}}) t.push_back(leg);
+  }
   if (params.sex == Sex::female && m.bustSpan) t.push_back({"bustSpan", false, *m.bustSpan});
   if (params.sex == Sex::female && m.underbust) t.insert(t.begin() + 2, {"underbust", true, *m.underbust});
   return t;
@@ -76,6 +79,13 @@ class Fitting {
       shift(t.elbow, "shoulderToElbow", m.shoulderToElbow, 1, 0.03 * u);
       shift(t.hand, "shoulderToWrist", m.shoulderToWrist, 1, 0.05 * u);
     }
+    if (params_.legs) {
+      scale(t.thigh, "upperLeg", *m.upperLeg);
+      scale(t.knee, "knee", *m.knee);
+      scale(t.ankle, "ankle", *m.ankle);
+      shift(t.crotch, "inseam", *m.inseam, -1, 0.02 * u);
+      t.crotch = std::clamp(t.crotch, -0.1 * u, 0.1 * u);
+    }
     return t;
   }
 
@@ -114,17 +124,46 @@ double misfit(const Gauge& g, const std::vector<Target>& wanted) {
 
 enum Region { torso, neck, arm_left, arm_right };
 
+// Names of a form's regions in the order of its face_region.
+std::vector<std::string> region_names(const FormParams& params) {
+  std::vector<std::string> names = {"torso", "neck"};
+  if (params.arms) names.insert(names.end(), {"arm_left", "arm_right"});
+  if (params.legs) names.insert(names.end(), {"leg_left", "leg_right"});
+  return names;
+}
+
 /// Of a point of the surface, by the landmarks: the armhole runs from the shoulder tip to the armpit; under it the side
 /// of the torso is nearer to the axis than the armpit and the arm farther.
 int region(const Vector3d& p, const Levels& l, const Gauge& gauge, const FormParams& params) {
   const auto at = [&](const char* name) { return Vector3d(gauge.landmarks.at(name).data()); };
   const double side = std::abs(p.x());
   if ((p - l.neck_point).dot(l.neck_normal) > 0 && side < 1.15 * at("hps_left").x()) return neck;
+  if (params.legs && p.y() < at("crotch").y()) return (params.arms ? 4 : 2) + (p.x() > 0 ? 0 : 1);
   if (!params.arms) return torso;
   const Vector3d tip = at("shoulder_left"), pit = at("armpit_left");
   const double share = std::max((p.y() - pit.y()) / (tip.y() - pit.y()), 0.0);
   if (side <= pit.x() + share * (tip.x() - pit.x())) return torso;
   return p.x() > 0 ? arm_left : arm_right;
+}
+
+/// What legs need of the measurements.
+Issues leg_issues(const Measurements& m) {
+  Issues issues;
+  for (const auto& [name, value] : {std::pair("inseam", m.inseam), std::pair("upperLeg", m.upperLeg), std::pair("knee", m.knee), std::pair("ankle", m.ankle)}) {
+    if (!value) issues.push_back({"missing_measurement", {.item = name}, fmt::format("{} is not given, which legs need", name), "add it to the measurements, or leave out `legs`"});
+  }
+  if (!issues.empty()) return issues;
+  const auto mm = [](double metres) { return fmt::format("{:.0f} mm", metres * 1000); };
+  const auto between = [&](const char* key, double value, double low, double high, const char* why) {
+    if (value >= low && value <= high) return;
+    issues.push_back({"implausible_measurement", {.item = key}, fmt::format("{} is {}", key, mm(value)), fmt::format("{}: expected {} to {}; check the value and its unit", why, mm(low), mm(high))});
+  };
+  between("inseam", *m.inseam, m.waistToFloor - m.waistToSeat - 0.12, m.waistToFloor - m.waistToSeat - 0.02, "the crotch lies under the seat");
+  between("upperLeg", *m.upperLeg, 0.48 * m.seat, 0.7 * m.seat, "against the seat");
+  between("knee", *m.knee, 0.55 * *m.upperLeg, 0.85 * *m.upperLeg, "against the upper leg");
+  between("ankle", *m.ankle, 0.45 * *m.knee, 0.85 * *m.knee, "against the knee");
+  if (m.waistToKnee) between("waistToKnee", *m.waistToKnee, m.waistToFloor - 0.68 * *m.inseam, m.waistToFloor - 0.45 * *m.inseam, "against inseam and waistToFloor");
+  return issues;
 }
 
 double smallest_angle(const mesh::Points3& x, const mesh::Triangles& faces) {
@@ -143,6 +182,7 @@ double smallest_angle(const mesh::Points3& x, const mesh::Triangles& faces) {
 Result<Form> make_form(const Measurements& m, const FormParams& params) {
   Issues issues = validate(m);
   append(issues, validate(params));
+  if (params.legs) append(issues, leg_issues(m));
   if (!issues.empty()) return issues;
 
   const std::vector<Target> wanted = targets(m, params);
@@ -204,8 +244,7 @@ Result<Form> make_form(const Measurements& m, const FormParams& params) {
   form.mesh.x = whole.x;
   form.mesh.faces = whole.faces;
   form.mesh.landmarks = gauge.landmarks;
-  form.mesh.region_names = {"torso", "neck"};
-  if (params.arms) form.mesh.region_names.insert(form.mesh.region_names.end(), {"arm_left", "arm_right"});
+  form.mesh.region_names = region_names(params);
   form.mesh.face_region.resize(whole.faces.rows());
   for (Eigen::Index f = 0; f < whole.faces.rows(); ++f) {
     const Vector3d centre = (whole.x.row(whole.faces(f, 0)) + whole.x.row(whole.faces(f, 1)) + whole.x.row(whole.faces(f, 2))).transpose() / 3;

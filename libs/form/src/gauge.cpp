@@ -107,6 +107,29 @@ Gauge measure(const mesh::Points3& x, const mesh::Triangles& faces, const Levels
   level("hips", l.hips, "hip");
   level("seat", l.seat, "seat");
   level("underbust", l.underbust, "");
+  if (params.legs) {
+    // The crotch: the lowest point of the trunk in the plane of symmetry.
+    Vector3d lowest(0, 1e9, 0);
+    for (const Polyline& curve : geometry::slice(x, faces, {Vector3d::Zero(), left})) {
+      const Vector3d p = farthest(curve, -up);
+      if (p.y() < lowest.y()) lowest = p;
+    }
+    if (lowest.y() > 1e8) lowest.y() = 0;
+    mark("crotch", lowest);
+    g.values["inseam"] = lowest.y();
+    const auto leg = [&](const std::string& name, double y, const std::string& landmark) {
+      std::optional<Polyline> best;
+      for (Polyline& curve : geometry::slice(x, faces, {{0, y, 0}, up})) {
+        if (curve.points.col(0).mean() <= 0 || (best && curve.points.rows() <= best->points.rows())) continue;
+        if (curve.points.col(0).minCoeff() > 0) best = std::move(curve);
+      }
+      g.values[name] = best ? geometry::tape_girth(best->points, up) : 0;
+      if (best && !landmark.empty()) mark_pair(landmark, farthest(*best, left));
+    };
+    leg("upperLeg", l.thigh, "thigh");
+    leg("knee", l.knee, "knee");
+    leg("ankle", l.ankle, "ankle");
+  }
   const auto chest = level("chest", l.chest, "chest");
 
   // Neck: girth where a collar sits, landmarks in the plane of its base.

@@ -105,6 +105,17 @@ Shape::Shape(const Measurements& m, const FormParams& params, const Tuning& tuni
   l.seat = l.waist - m.waistToSeat;
   const double leg = m.waistToUpperLeg ? l.waist - *m.waistToUpperLeg : l.seat - 0.06 * u;
   l.bottom = std::min(leg, l.seat - 0.05 * u) - 0.035 * u;
+  if (params.legs) {
+    const double crotch = *m.inseam;
+    l.crotch = crotch;
+    l.thigh = crotch - 0.06 * u;
+    l.knee = m.waistToKnee ? l.waist - *m.waistToKnee : 0.57 * crotch;
+    l.ankle = 0.1 * crotch;
+    l.calf = l.ankle + 0.68 * (l.knee - l.ankle);
+    l.floor = l.ankle - 0.02 * u;
+    // The trunk's floor lies inside the legs; the crotch is where the legs meet below it.
+    l.bottom = crotch - tuning.crotch + 0.004 * u;
+  }
   l.hps = l.waist + tuning.hps_height;
   l.armpit = l.waist + m.waistToArmpit;
   l.bust = l.waist + tuning.bust_height;
@@ -129,6 +140,8 @@ Shape::Shape(const Measurements& m, const FormParams& params, const Tuning& tuni
   const double axilla = l.shoulder - 0.062 * u;
   const double under_seat = l.seat - 0.055 * u;
 
+  const double lowest = params.legs ? std::min(l.bottom, under_seat) - 0.03 * u : l.bottom - 0.03 * u;
+
   struct Level {
     double y, width, front, back, centre, front_power, back_power;
   };
@@ -136,7 +149,7 @@ Shape::Shape(const Measurements& m, const FormParams& params, const Tuning& tuni
   const double upper_chest = l.chest + 0.45 * (axilla - l.chest);
   if (male) {
     levels = {
-        {l.bottom - 0.03 * u, 0.160 * seat, 0.086 * seat, 0.076 * seat, 0.024 * u, 2.3, 2.3},
+        {lowest, 0.160 * seat, 0.086 * seat, 0.076 * seat, 0.024 * u, 2.3, 2.3},
         {under_seat, 0.187 * seat, 0.096 * seat, 0.102 * seat, 0.024 * u, 2.3, 2.3},
         {l.seat, 0.190 * seat, 0.100 * seat, 0.121 * seat, 0.023 * u, 2.3, 2.35},
         {l.hips, 0.180 * hips, 0.111 * hips, 0.127 * hips, 0.028 * u, 2.35, 2.35},
@@ -152,7 +165,7 @@ Shape::Shape(const Measurements& m, const FormParams& params, const Tuning& tuni
     };
   } else {
     levels = {
-        {l.bottom - 0.03 * u, 0.164 * seat, 0.084 * seat, 0.076 * seat, 0.020 * u, 2.25, 2.25},
+        {lowest, 0.164 * seat, 0.084 * seat, 0.076 * seat, 0.020 * u, 2.25, 2.25},
         {under_seat, 0.192 * seat, 0.092 * seat, 0.104 * seat, 0.018 * u, 2.25, 2.25},
         {l.seat, 0.193 * seat, 0.097 * seat, 0.122 * seat, 0.016 * u, 2.25, 2.3},
         {l.hips, 0.186 * hips, 0.110 * hips, 0.124 * hips, 0.022 * u, 2.25, 2.25},
@@ -180,7 +193,7 @@ Shape::Shape(const Measurements& m, const FormParams& params, const Tuning& tuni
   back_power_ = profile(&Level::back_power, 0.02);
   // The shoulder line: a slope that leaves the neck in a hollow curve and is rounded off at the shoulder.
   const double hollow = 0.020 * u;
-  width_ = Profile::sampled(l.bottom - 0.05 * u, l.hps + 0.15 * u, 0.004 * u, [&](double y) {
+  width_ = Profile::sampled(lowest - 0.02 * u, l.hps + 0.15 * u, 0.004 * u, [&](double y) {
     const double run = (l.hps - y) / slope / hollow;
     const double line = neck_half + hollow * (run > 30 ? run : std::log1p(std::exp(run)));
     return smooth_min(line, wide.at(y).f, 0.06 * u);
@@ -227,6 +240,37 @@ Shape::Shape(const Measurements& m, const FormParams& params, const Tuning& tuni
   arm_high_ = arm_profile(&Ring::high, 0);
   arm_low_ = arm_profile(&Ring::low, tuning.arm_root);
   arm_deep_ = arm_profile(&Ring::deep, 0);
+
+  // ---- legs: half ovals along a line that leaves the hip joint outwards ----
+  if (params.legs) {
+    const double r = *m.upperLeg * tuning.thigh / (2 * pi), k = *m.knee * tuning.knee / (2 * pi), a = *m.ankle * tuning.ankle / (2 * pi);
+    const double apart = 0.024 * u;  // of the thigh from the plane of symmetry
+    const double hip = l.seat + 0.02 * u, z = centre_.at(l.seat).f;
+    const double x = apart + 0.93 * r;
+    struct Ring {
+      double y, x, z, wide, front, back;
+    };
+    const std::vector<Ring> rings = {
+        {l.floor - 0.08 * u, 0.152 * u, z - 0.044 * u, 1.0 * a, 0.98 * a, 1.02 * a},
+        {l.ankle, 0.150 * u, z - 0.040 * u, 0.97 * a, 1.0 * a, 1.06 * a},
+        {l.ankle + 0.3 * (l.knee - l.ankle), 0.145 * u, z - 0.030 * u, 0.55 * a + 0.45 * k, 0.55 * a + 0.44 * k, 0.55 * a + 0.50 * k},
+        {l.calf, 0.138 * u, z - 0.020 * u, 0.98 * k, 0.86 * k, 1.12 * k},
+        {l.knee, 0.127 * u, z - 0.006 * u, 0.97 * k, 1.03 * k, 1.0 * k},
+        {l.knee + 0.35 * (l.thigh - l.knee), 0.45 * 0.127 * u + 0.55 * x - 0.001 * u, z, 0.4 * r + 0.6 * k, 0.46 * r + 0.6 * k, 0.40 * r + 0.6 * k},
+        {l.thigh, x, z, 0.93 * r, 1.09 * r, 1.07 * r},
+        {0.4 * l.thigh + 0.6 * hip, x - 0.008 * u, z, 0.87 * r, 0.96 * r, 1.0 * r},
+        {hip + 0.1 * u, x - 0.030 * u, z, 0.66 * r, 0.66 * r, 0.7 * r}};
+    const auto leg_profile = [&](double Ring::*member) {
+      std::vector<std::pair<double, double>> knots;
+      for (const Ring& ring : rings) knots.emplace_back(ring.y, ring.*member);
+      return Profile(knots, 0.03 * u);
+    };
+    leg_x_ = leg_profile(&Ring::x);
+    leg_z_ = leg_profile(&Ring::z);
+    leg_wide_ = leg_profile(&Ring::wide);
+    leg_front_ = leg_profile(&Ring::front);
+    leg_back_ = leg_profile(&Ring::back);
+  }
 
   // ---- without arms: the plate that closes the armhole, from the shoulder tip to the side under the armpit ----
   const double side = width_.at(l.chest).f;
@@ -291,6 +335,20 @@ double Shape::arm(const Vector3d& p) const {
   return smooth_max(tube, t - (levels_.hand + 0.012 * u), 0.02 * u);
 }
 
+// The left leg; both are the mirror images of one another, so x is not folded here: the saddle between them is smooth.
+double Shape::leg(const Vector3d& p) const {
+  const double u = levels_.unit;
+  const auto cx = leg_x_.at(p.y()), cz = leg_z_.at(p.y()), w = leg_wide_.at(p.y()), df = leg_front_.at(p.y()), db = leg_back_.at(p.y());
+  const double a = p.x() - cx.f, b = p.z() - cz.f;
+  const double sigma = frontness(b, 0.012 * u);
+  const double d = db.f + (df.f - db.f) * sigma, dd = db.d + (df.d - db.d) * sigma;
+  const double A = a / w.f, B = b / d, top = levels_.seat + 0.02 * u, T = std::max(p.y() - top, 0.0) / (0.07 * u);
+  const double g = std::max(1e-3, std::sqrt(A * A + B * B + T * T));
+  const double ga = A / g / w.f, gb = B / g / d, gy = (-A * A * w.d / w.f - A / w.f * cx.d - B * B * dd / d - B / d * cz.d + T / (0.07 * u)) / g;
+  const double tube = (g - 1) / std::sqrt(ga * ga + gb * gb + gy * gy + 1e-9);
+  return smooth_max(tube, levels_.floor - p.y(), 0.02 * u);
+}
+
 double Shape::operator()(const Vector3d& p) const {
   const double u = levels_.unit;
   const Vector3d q(std::abs(p.x()), p.y(), p.z());
@@ -325,7 +383,11 @@ double Shape::operator()(const Vector3d& p) const {
     const double below = std::max(levels_.chest + 0.02 * u - p.y(), 0.0);  // the plate ends under the armpit
     f = smooth_max(f, (q - plate_point_).dot(plate_normal_) - below * below / (0.05 * u), 0.022 * u);
   }
-  f = smooth_max(f, levels_.bottom - p.y(), 0.065 * u);
+  f = smooth_max(f, levels_.bottom - p.y(), (params_.legs ? 0.035 : 0.065) * u);
+  if (params_.legs) {
+    const double both = smooth_min(leg(p), leg({-p.x(), p.y(), p.z()}), 0.02 * u);
+    f = smooth_min(f, both, 0.07 * u);
+  }
   // The neck's cap leans less than its base.
   const Vector3d cap(0, std::cos(0.2), std::sin(0.2));
   const double over = (p - Vector3d(0, levels_.top, centre_.at(levels_.top).f)).dot(cap);
@@ -351,10 +413,17 @@ double Shape::sizing(const Vector3d& p) const {
     const double high = (p.y() - levels_.chest) / (0.03 * u);
     s *= 1 - 0.35 * std::exp(-off * off) * frontness(high, 1);
   }
+  if (params_.legs) {
+    // Finer down the leg, and where the thighs part.
+    s -= 0.35 * std::clamp((levels_.crotch - p.y()) / (levels_.crotch - levels_.ankle), 0.0, 1.0);
+    const Vector3d fork(0, levels_.crotch, centre_.at(levels_.seat).f);
+    const Vector3d d = (Vector3d(std::abs(p.x()), p.y(), p.z()) - fork).cwiseQuotient(Vector3d(0.05 * u, 0.05 * u, 0.12 * u));
+    s *= 1 - 0.35 * std::exp(-d.squaredNorm());
+  }
   return s;
 }
 
-Vector3d Shape::low() const { return {0, levels_.bottom - 0.03 * levels_.unit, -0.26 * levels_.unit - 0.1}; }
+Vector3d Shape::low() const { return {0, (params_.legs ? levels_.floor : levels_.bottom) - 0.03 * levels_.unit, -0.26 * levels_.unit - 0.1}; }
 Vector3d Shape::high() const {
   const double u = levels_.unit;
   const double out = params_.arms ? levels_.arm_joint.x() + (levels_.hand + 0.05 * u) * levels_.arm_direction.x() + 0.06 * u : 0;

@@ -43,6 +43,8 @@ struct Tuning {
   double bust_out = 0;        ///< of the bust points' places from the requested ones [m]
   double arm_root = 0;        ///< how far the underarm is let down [m]
   double elbow = 0, hand = 0; ///< from the shoulder joint along the arm [m]
+  double thigh = 1, knee = 1, ankle = 1;
+  double crotch = 0;          ///< how far the crotch is built under where it is asked for [m]
 };
 
 /// Levels and places that follow from measurements and tuning.
@@ -54,6 +56,8 @@ struct Levels {
   Eigen::Vector3d collar_point;             ///< a little higher, where the neck's girth is taken
   Eigen::Vector3d arm_joint, arm_direction, arm_outer;  ///< of the left arm (+x)
   double elbow = 0, hand = 0, biceps = 0;   ///< along the arm from the joint
+  // of legs, heights
+  double crotch = 0, thigh = 0, knee = 0, calf = 0, ankle = 0;
 };
 
 class Shape {
@@ -75,6 +79,7 @@ class Shape {
   };
   double torso(const Eigen::Vector3d& p) const;
   double arm(const Eigen::Vector3d& p) const;
+  double leg(const Eigen::Vector3d& p) const;
   void bump(double x, double y, double z, double sx, double sy, double sz, double height);
 
   FormParams params_;
@@ -83,6 +88,7 @@ class Shape {
   double arm_blend_ = 0.1;
   Eigen::Vector3d plate_point_, plate_normal_;
   Profile arm_high_, arm_low_, arm_deep_;
+  Profile leg_x_, leg_z_, leg_wide_, leg_front_, leg_back_;
   std::vector<Bump> bumps_;
   struct Breast {
     double x, y, inner, outer, upper, lower, height;

@@ -16,6 +16,7 @@ enum class Sex { male, female };
 struct FormParams {
   Sex sex = Sex::male;
   bool arms = true;
+  bool legs = false;
   double arm_angle = 0.7853981633974483;
   int vertices = 6000;
   double girth_tolerance = 0.002;
@@ -24,6 +25,7 @@ struct FormParams {
   static void describe(auto& f) {
     f(&FormParams::sex, {.key = "sex", .doc = "male or female build"});
     f(&FormParams::arms, {.key = "arms", .doc = "arms in A-pose, closed at the wrist; without them the shoulders are rounded off"});
+    f(&FormParams::legs, {.key = "legs", .doc = "legs, a little apart, closed at the ankles; without them the form ends under the seat. They need the measurements inseam, upperLeg, knee and ankle"});
     f(&FormParams::arm_angle, {.key = "arm_angle", .doc = "how far the arms hang under the horizontal", .unit = "rad", .min = 0.5, .max = 1.1});
     f(&FormParams::vertices, {.key = "vertices", .doc = "wanted number of vertices (met within 4 %)", .min = 1000, .max = 60000});
     f(&FormParams::girth_tolerance, {.key = "girth_tolerance", .doc = "largest allowed difference of a girth", .unit = "m", .min = 1e-5, .max = 0.05});

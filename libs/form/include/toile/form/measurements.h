@@ -16,9 +16,11 @@ struct Measurements {
   double shoulderToElbow = 0, shoulderToWrist = 0;
   // refine the form where given
   std::optional<double> underbust, waistToUnderbust, bustSpan, waistToUpperLeg;
+  // of legs
+  std::optional<double> ankle, inseam, knee, upperLeg, waistToKnee;
   // known, not used by the form
-  std::optional<double> ankle, bustFront, bustPointToUnderbust, crossSeam, crossSeamFront, crotchDepth, head, heel, highBust,
-      highBustFront, hpsToWaistFront, inseam, knee, seatBack, stature, upperLeg, waistBack, waistToKnee;
+  std::optional<double> bustFront, bustPointToUnderbust, crossSeam, crossSeamFront, crotchDepth, head, heel, highBust,
+      highBustFront, hpsToWaistFront, seatBack, stature, waistBack;
 
   static void describe(auto& f) {
     using M = Measurements;
@@ -51,7 +53,7 @@ struct Measurements {
     maybe(&M::bustSpan, "bustSpan", "distance of the bust points", 0.1, 0.35);
     maybe(&M::waistToUpperLeg, "waistToUpperLeg", "from the waist down to the top of the leg", 0.15, 0.45);
     const char* not_used = "known, not used by the form";
-    maybe(&M::ankle, "ankle", not_used, 0.1, 0.6);
+    maybe(&M::ankle, "ankle", "for legs: girth over the ankle", 0.1, 0.6);
     maybe(&M::bustFront, "bustFront", not_used, 0.2, 1);
     maybe(&M::bustPointToUnderbust, "bustPointToUnderbust", not_used, 0.02, 0.25);
     maybe(&M::crossSeam, "crossSeam", not_used, 0.3, 1.5);
@@ -62,13 +64,13 @@ struct Measurements {
     maybe(&M::highBust, "highBust", not_used, 0.6, 1.7);
     maybe(&M::highBustFront, "highBustFront", not_used, 0.2, 1);
     maybe(&M::hpsToWaistFront, "hpsToWaistFront", not_used, 0.25, 0.75);
-    maybe(&M::inseam, "inseam", not_used, 0.4, 1.2);
-    maybe(&M::knee, "knee", not_used, 0.2, 0.8);
+    maybe(&M::inseam, "inseam", "for legs: height of the crotch over the floor", 0.4, 1.2);
+    maybe(&M::knee, "knee", "for legs: girth of the knee", 0.2, 0.8);
     maybe(&M::seatBack, "seatBack", not_used, 0.2, 1);
     maybe(&M::stature, "stature", not_used, 1.1, 2.3);
-    maybe(&M::upperLeg, "upperLeg", not_used, 0.3, 1.1);
+    maybe(&M::upperLeg, "upperLeg", "for legs: girth of the thigh, 60 mm (times the body's size) under the crotch", 0.3, 1.1);
     maybe(&M::waistBack, "waistBack", not_used, 0.2, 0.9);
-    maybe(&M::waistToKnee, "waistToKnee", not_used, 0.3, 0.9);
+    maybe(&M::waistToKnee, "waistToKnee", "for legs: from the waist down to the knee", 0.3, 0.9);
     f.check([](const Measurements& m, Issues& issues) { check_together(m, issues); });
   }
   /// Measurements that contradict each other, one issue each.
