@@ -24,6 +24,7 @@ using Vertex = CGAL::Triangulation_vertex_base_with_info_2<int, Kernel>;
 using Face = CGAL::Constrained_triangulation_face_base_2<Kernel>;
 using Triangulation = CGAL::Constrained_Delaunay_triangulation_2<Kernel, CGAL::Triangulation_data_structure_2<Vertex, Face>, CGAL::Exact_predicates_tag>;
 
+constexpr double kNode = 0.1;    // a vertex stands for a grid's node up to this squared distance, in cells of the grid
 constexpr double kCorner = 0.6;  // a border that turns by more than this keeps its vertex [rad]
 
 double cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
@@ -291,9 +292,12 @@ CoarseGarment coarsen(const mesh::GarmentMesh& garment, double wanted) {
       const auto it = nodes.find(key);
       if (it == nodes.end() || d < it->second.first - 1e-9) nodes[key] = {d, v};
     }
+    // No node without its vertex: the fine grid may lie half a cell beside the nodes both ways.
+    const double cell = std::max(garment.panels[p].cell_warp, garment.panels[p].cell_weft) / size;
+    const double far = std::max(kNode, 0.51 * cell * cell);
     for (const auto& [key, node] : nodes) {
       const Vector2d q = uv(node.second);
-      if (node.first > 0.1 || !inside(outlines, q) || near_kept(q)) continue;
+      if (node.first > far || !inside(outlines, q) || near_kept(q)) continue;
       triangulation.insert({q.x(), q.y()})->info() = node.second;
     }
     for (const auto& handle : handles) {
