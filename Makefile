@@ -1,12 +1,13 @@
 # The front door. `make help` lists what there is; CMake does the work in build/release.
 .DEFAULT_GOAL := help
-.PHONY: help deps configure tools tee skirt jacket waistcoat test bench docs asan ubsan clean
+.PHONY: help deps configure tools tee skirt trousers jacket waistcoat test bench docs asan ubsan clean
 BUILD := build/release
 JOBS ?= $(shell nproc)
 
 help:
 	@echo 'make tee      install what is missing, build, and make a T-shirt: pattern -> garment at rest on a dress form'
 	@echo 'make skirt    the same for a skirt with darts'
+	@echo 'make trousers the same for a pair of trousers, on a dress form with legs'
 	@echo 'make jacket   a man'"'"'s jacket, from pattern to layered shell, put on a dress form (not yet draped)'
 	@echo 'make waistcoat   the same of a waistcoat'
 	@echo 'make test     build and run all tests'
@@ -25,7 +26,7 @@ configure: deps
 tools: configure
 	@cmake --build $(BUILD) --target tools -j $(JOBS)
 
-tee skirt jacket waistcoat: tools
+tee skirt trousers jacket waistcoat: tools
 	@$(BUILD)/bin/toile run pipelines/$@/pipeline.yaml --build build/garments -j $(JOBS)
 
 test: configure
