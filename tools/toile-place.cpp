@@ -28,15 +28,15 @@ struct PlaceStage {
 
   static stage::Description description() {
     return {.name = "toile-place",
-            .version = 8,
+            .version = 9,
             .summary = "Bends sewn flat panels around a body without stretching them and draws their seams together.",
             .example = "toile-place layered.ply form.ply -o placed.ply",
-            .details = "Each panel goes on the trunk or on an arm, as its name and its seams say (front, back, waistband, sleeve), or as `panels` "
+            .details = "Each panel goes on the trunk, an arm or a leg, as its name and its seams say (front, back, waistband, sleeve, leg, trouser), or as `panels` "
                        "in the spec says. Panels are rolled round that part with every length kept, then drawn together by their seams while "
                        "the body, flattened at first, swells between them. The seams that stay open close in the simulation; the summary lists "
                        "them, with the largest edge strain, the angle of the warp from its wanted direction, the smallest gap to the body and any intersections; "
                        "the file has them as columns (edge_strain, ease, seam_gap of vertices; warp_angle, cuts of faces). The body needs no landmarks: "
-                       "waist, hips, armpits, shoulders and arms are found from its sections. With `start` panels begin where the panels of the same names in that file are, through "
+                       "waist, hips, crotch, armpits, shoulders, arms and legs are found from its sections. With `start` panels begin where the panels of the same names in that file are, through "
                        "their panel coordinates, and are relaxed from there. With `lines` in the spec the support is a frame instead (a soft top's bows, a tarpaulin's poles): named "
                        "lines of panels go to named curves, and the cloth is spread between them. docs/placement.md says how.",
             .inputs = {{.name = "garment", .doc = "sewn garment (flat panels)", .kind = stage::FileKind::garment},

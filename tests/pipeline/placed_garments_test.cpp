@@ -87,6 +87,15 @@ TEST(placed_garments, skirt) {
   expect_placed(placed, params, 0.005, 0.012);
 }
 
+TEST(placed_garments, trousers_of_three_sizes) {
+  const auto params = spec<placement::PlaceParams>("trousers", "placement.yaml");
+  for (const double scale : {0.93, 1.0, 1.12}) {
+    SCOPED_TRACE(scale);
+    const auto placed = checked(placement::place(layered("trousers", {"suiting", "fusible_canvas"}, kCell, scale), form_of("trousers", "woman", scale), params));
+    expect_placed(placed, params, 0.008, 0.035);
+  }
+}
+
 TEST(placed_garments, waistcoat_is_lapped_left_over_right) {
   const auto params = spec<placement::PlaceParams>("waistcoat", "placement.yaml");
   const auto g = layered("waistcoat", {"suiting", "lining", "fusible_canvas"}, kCell);

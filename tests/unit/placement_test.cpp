@@ -413,6 +413,18 @@ TEST(coarse, keeps_area_seams_and_flat_states) {
 
 // ---- the whole
 
+TEST(coarse, has_vertices_inside_wherever_the_fine_grid_lies) {
+  for (const double shift : {0.0, 0.004, 0.0075, 0.011}) {
+    mesh::GarmentMesh g;
+    add_rectangle(g, "front", 30, 30, 0.015);
+    g.uv.array() += shift;
+    const CoarseGarment coarse = coarsen(g, 0.03);
+    double longest = 0;
+    for (const mesh::Edge& edge : mesh::edges(coarse.mesh.faces)) longest = std::max(longest, (coarse.mesh.uv.row(edge.a) - coarse.mesh.uv.row(edge.b)).norm());
+    EXPECT_LT(longest, 0.07) << shift;
+  }
+}
+
 TEST(place, tube_goes_round_the_hips_without_stretch) {
   const auto g = tube(26, 15);  // 1.04 m round, 0.3 m high
   PlaceParams params;
@@ -774,6 +786,14 @@ const mesh::SupportMesh& stander() {
   return mesh;
 }
 
+// The same with the legs bent at the knee: shins go back by 35 mm in 100 below 0.35 m.
+double knee_shift(double y) { return y < 0.35 ? -0.35 * (0.35 - y) : 0; }
+mesh::SupportMesh kneeling() {
+  mesh::SupportMesh body = stander();
+  for (Eigen::Index v = 0; v < body.x.rows(); ++v) body.x(v, 2) += knee_shift(body.x(v, 1));
+  return body;
+}
+
 // Two leg tubes, each of a front and a back.
 mesh::GarmentMesh leg_tubes(int nu, int nv) {
   mesh::GarmentMesh g;
@@ -841,4 +861,86 @@ TEST(place, says_when_legs_are_missing_unknown_or_too_thick) {
   const auto unknown = place(g, stander(), {});
   ASSERT_FALSE(unknown.has_value());
   EXPECT_EQ(codes(unknown.issues()), std::vector<std::string>(2, "no_region"));
+}
+
+TEST(legs, the_axis_follows_bent_legs_and_stays_straight_on_straight_ones) {
+  const auto frame = body_frame(stander());
+  const LegAxis straight(*frame->leg_left, LegAxis::Shape::tube);
+  EXPECT_NEAR(straight.at(0).middle.y(), frame->leg_left->origin.y(), 1e-12);
+  EXPECT_NEAR(straight.at(straight.height(0.3)).middle.y(), 0.3, 1e-9);
+  EXPECT_NEAR((straight.at(-0.1).up - straight.at(-0.6).up).norm(), 0, 1e-12);
+
+  const auto bent = body_frame(kneeling());
+  ASSERT_TRUE(bent && bent->leg_left);
+  const LegAxis axis(*bent->leg_left, LegAxis::Shape::tube);
+  double last = 1;
+  for (const double y : {0.6, 0.5, 0.35, 0.2}) {
+    const double h = axis.height(y);
+    EXPECT_LT(h, last);
+    last = h;
+    const LegAxis::Place place = axis.at(h);
+    EXPECT_NEAR(place.middle.y(), y, 1e-9);
+    EXPECT_NEAR(place.middle.z(), knee_shift(y), 0.012);
+    EXPECT_NEAR(place.up.cross(place.front).dot(place.left), 1, 1e-9);
+  }
+  EXPECT_NEAR(axis.height(0.6) - axis.height(0.2), 0.25 + std::hypot(0.15, 0.35 * 0.15), 0.02) << "by length along the leg";
+}
+
+TEST(place, tubes_follow_bent_legs) {
+  const auto placed = place(leg_tubes(14, 32), kneeling(), {});
+  ASSERT_TRUE(placed.has_value()) << placed.issues().front().what;
+  EXPECT_LT(placed->report.max_strain, 0.005);
+  EXPECT_LT(placed->report.rms_strain, 0.001);
+  EXPECT_EQ(placed->report.vertices_inside, 0);
+  EXPECT_TRUE(placed->report.self_intersections.empty());
+  // cells of 20 mm bridge the sharp knee
+  EXPECT_LE(placed->report.support_intersections.size(), 4u);
+  EXPECT_LT(placed->report.mean_seam_gap, 0.008);
+  // the lowest row surrounds the shin
+  Vector3d middle = Vector3d::Zero();
+  for (int i = 0; i <= 14; ++i) middle += (placed->garment.x.row(at(placed->garment, 0, 14, i, 0)) + placed->garment.x.row(at(placed->garment, 1, 14, i, 0))).transpose() / 30;
+  EXPECT_NEAR(middle.z(), knee_shift(middle.y()), 0.03);
+}
+
+TEST(layout, leg_tubes_start_at_the_crotch_or_where_an_anchor_says) {
+  const auto g = leg_tubes(14, 20);
+  const auto frame = body_frame(stander());
+  const auto top = [&](const Layout& layout, int panel) { return layout.panels[static_cast<std::size_t>(panel)](Vector2d(7 * kCell, 20 * kCell)); };
+  const LegAxis axis(*frame->leg_left, LegAxis::Shape::tube);
+  const auto free = make_layout(g, fold_flat(g), stander(), *frame, with_named_legs(g, {}));
+  ASSERT_TRUE(free.has_value());
+  EXPECT_NEAR(axis.at(top(*free, 0).y()).middle.y(), frame->crotch, 0.011);
+
+  PlaceParams params;
+  params.panels["front_leg_left"].point = "bottom";
+  params.panels["front_leg_left"].to = {0.17, 0.2, 0};  // the outside of the leg
+  const auto to = make_layout(g, fold_flat(g), stander(), *frame, with_named_legs(g, params));
+  ASSERT_TRUE(to.has_value()) << to.issues().front().what;
+  EXPECT_NEAR(axis.at(top(*to, 0).y() - 20 * kCell).middle.y(), 0.2, 1e-6);
+  EXPECT_NEAR(top(*to, 0).x() / to->girth_leg_left, 0.25, 0.03);
+  EXPECT_NEAR(top(*to, 2).y(), top(*free, 2).y(), 1e-9) << "the other leg stays";
+  params.panels["front_leg_left"].to.clear();
+  params.panels["front_leg_left"].point = "top_left";
+  const auto usual = make_layout(g, fold_flat(g), stander(), *frame, with_named_legs(g, params));
+  EXPECT_NEAR(axis.at(top(*usual, 0).y()).middle.y(), frame->crotch, 1e-6) << "without `at`: the crotch";
+
+  const auto refused = [&](const PanelSpec& spec) {
+    PlaceParams wrong;
+    wrong.panels["front_leg_left"] = spec;
+    const auto layout = make_layout(g, fold_flat(g), stander(), *frame, with_named_legs(g, wrong));
+    return layout ? std::string() : layout.issues().front().code + " " + layout.issues().front().place.item;
+  };
+  EXPECT_EQ(refused({.region = Region::automatic, .point = "top", .at = {}, .to = {-0.17, 0.2, 0}}), "off_support panels.front_leg_left.to");  // the other leg
+  EXPECT_EQ(refused({.region = Region::automatic, .point = "top", .at = {}, .to = {0.18, 1.1, 0}}), "off_support panels.front_leg_left.to");   // the trunk
+  EXPECT_EQ(refused({.region = Region::automatic, .point = "tip", .at = {}, .to = {}}), "unknown_anchor panels.front_leg_left.point");
+}
+
+TEST(layout, panels_of_arms_have_no_anchor) {
+  const auto g = boxy_tee();
+  const auto frame = body_frame(man());
+  PlaceParams params;
+  params.panels[g.panels[2].name].point = "top";
+  const auto layout = make_layout(g, fold_flat(g), man(), *frame, params);
+  ASSERT_FALSE(layout.has_value());
+  EXPECT_EQ(codes(layout.issues()), std::vector<std::string>{"bad_anchor"});
 }

@@ -188,6 +188,7 @@ void find_legs(const mesh::SupportMesh& support, BodyFrame& frame) {
       LimbPoint point;
       point.centre = 0.5 * (nearest->points.colwise().maxCoeff() + nearest->points.colwise().minCoeff()).transpose();
       point.girth = geometry::tape_girth(nearest->points, Eigen::Vector3d::UnitY());
+      point.hull = hull_of({nearest});
       for (Eigen::Index k = 0; k < nearest->points.rows(); ++k) point.radius = std::max(point.radius, (nearest->points.row(k).transpose() - point.centre).norm());
       // into the foot
       if (!legs[i].points.empty() && (point.girth > 1.15 * legs[i].points.back().girth || (point.centre - legs[i].points.back().centre).norm() > 0.03)) continue;

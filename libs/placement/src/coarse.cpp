@@ -292,12 +292,19 @@ CoarseGarment coarsen(const mesh::GarmentMesh& garment, double wanted) {
       const auto it = nodes.find(key);
       if (it == nodes.end() || d < it->second.first - 1e-9) nodes[key] = {d, v};
     }
-    // No node without its vertex: the fine grid may lie half a cell beside the nodes both ways.
-    const double cell = std::max(garment.panels[p].cell_warp, garment.panels[p].cell_weft) / size;
-    const double far = std::max(kNode, 0.51 * cell * cell);
+    // Where the fine grid lies half a cell beside the nodes both ways none has its vertex: then the nearest will do.
+    const auto alone = [&](const std::pair<long, long>& key) {
+      for (long i = -1; i <= 1; ++i) {
+        for (long j = -1; j <= 1; ++j) {
+          const auto it = nodes.find({key.first + i, key.second + j});
+          if (it != nodes.end() && it->second.first <= kNode) return false;
+        }
+      }
+      return true;
+    };
     for (const auto& [key, node] : nodes) {
       const Vector2d q = uv(node.second);
-      if (node.first > far || !inside(outlines, q) || near_kept(q)) continue;
+      if ((node.first > kNode && !alone(key)) || !inside(outlines, q) || near_kept(q)) continue;
       triangulation.insert({q.x(), q.y()})->info() = node.second;
     }
     for (const auto& handle : handles) {

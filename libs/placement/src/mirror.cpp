@@ -47,6 +47,8 @@ Part mirrored(Part part) {
   switch (part) {
     case Part::arm_left: return Part::arm_right;
     case Part::arm_right: return Part::arm_left;
+    case Part::leg_left: return Part::leg_right;
+    case Part::leg_right: return Part::leg_left;
     default: return part;
   }
 }

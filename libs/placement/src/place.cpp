@@ -519,8 +519,7 @@ Result<Start> bend(const mesh::GarmentMesh& garment, const FoldedFlat& folded, c
     }
     for (const Eigen::Index v : members) start.x.row(v) = tube(flat[static_cast<std::size_t>(v)], needed, sheet[static_cast<std::size_t>(v)]).transpose();
   }
-  // Legs: a straight tube along the leg whose section is the hull of the leg, enlarged away from the other leg to the girth of the
-  // panels, below whatever hangs on the trunk.
+  // Legs: a tube along the leg whose section is the hull of the leg, enlarged away from the other leg to the girth of the panels.
   for (const Part part : {Part::leg_left, Part::leg_right}) {
     const double girth = part == Part::leg_left ? layout.girth_leg_left : layout.girth_leg_right;
     const std::optional<Limb>& limb = part == Part::leg_left ? frame.leg_left : frame.leg_right;
@@ -528,34 +527,24 @@ Result<Start> bend(const mesh::GarmentMesh& garment, const FoldedFlat& folded, c
     std::vector<Eigen::Index> members;
     double h_low = 1e9, h_high = -1e9;
     for (Eigen::Index v = 0; v < n; ++v) {
-      if (part_of(v) != part) continue;
+      if (part_of(v) != part || layout.panels[static_cast<std::size_t>(garment.vertex_panel[v])].rise) continue;
       members.push_back(v);
       h_low = std::min(h_low, flat[static_cast<std::size_t>(v)].y());
       h_high = std::max(h_high, flat[static_cast<std::size_t>(v)].y());
     }
     if (members.empty()) continue;
     TOILE_CHECK(limb.has_value(), "part {}", static_cast<int>(part));
-    const Vector3d up = -limb->direction;
-    const Vector3d front = (Vector3d::UnitZ() - up.z() * up).normalized(), left = up.cross(front);
-    double top = 0;  // along `up` from the leg's origin
-    if (low < high) top = std::min(top, low - kSheet - 0.01 - limb->origin.y());
-    const double slide = top - h_high;
+    const LegAxis axis(*limb, LegAxis::Shape::tube);
     double worst = 0;
     std::optional<Issue> narrow;
     std::vector<Vector3d> outline;  // of the leg, seen along it
     for (const LimbPoint& point : limb->points) {
-      const double h = (point.centre - limb->origin).dot(up) - slide;
+      const double h = axis.height(point.centre.y());
       if (h < h_low - 0.01 || h > h_high + 0.01) continue;
-      const Section& section = frame.section(point.centre.y());
-      for (Eigen::Index i = 0; i < section.hull.rows(); ++i) {
-        const Vector3d d = Vector3d(section.hull(i, 1), section.y, section.hull(i, 0)) - limb->origin;
-        if (side * (section.hull(i, 1) - frame.x_mid) > 0) outline.emplace_back(d.dot(left), 0, d.dot(front));
-      }
-      // The hull of both legs leaves the inner sides out.
-      for (int k = 0; k < 24; ++k) {
-        const double angle = 2 * std::numbers::pi * k / 24, r = point.girth / (2 * std::numbers::pi);
-        const Vector3d d = point.centre - limb->origin;
-        outline.emplace_back(d.dot(left) + r * std::sin(angle), 0, d.dot(front) + r * std::cos(angle));
+      const LegAxis::Place place = axis.at(h);
+      for (Eigen::Index i = 0; i < point.hull.rows(); ++i) {
+        const Vector3d d = Vector3d(point.hull(i, 1), point.centre.y(), point.hull(i, 0)) - place.middle;
+        outline.emplace_back(d.dot(place.left), 0, d.dot(place.front));
       }
       if (girth <= 0 || h < h_low + 0.005 || h > h_high - 0.005) continue;
       std::vector<int> panels;
@@ -570,7 +559,7 @@ Result<Start> bend(const mesh::GarmentMesh& garment, const FoldedFlat& folded, c
     if (narrow) issues.push_back(*narrow);
     if (outline.empty()) {
       issues.push_back({.code = "off_support", .place = {.item = "panels of a leg"}, .what = "they would lie where the support has no leg",
-                        .remedy = "check their shift and the units of pattern and support"});
+                        .remedy = "check their anchors (point, at, to, shift) and the units of pattern and support"});
     }
     if (!issues.empty()) continue;
     Points3 all(static_cast<Eigen::Index>(outline.size()), 3);
@@ -592,8 +581,13 @@ Result<Start> bend(const mesh::GarmentMesh& garment, const FoldedFlat& folded, c
       const double level = sheet[static_cast<std::size_t>(v)];
       const ConvexSection& curve = curves.try_emplace(level, section, margin + kSheet * level, middle, Vector2d(1, 0)).first->second;
       const Vector2d at = curve.point(flat[static_cast<std::size_t>(v)].x());
-      start.x.row(v) = (limb->origin + at.y() * left + at.x() * front + (flat[static_cast<std::size_t>(v)].y() + slide) * up).transpose();
+      const LegAxis::Place place = axis.at(flat[static_cast<std::size_t>(v)].y());
+      start.x.row(v) = (place.middle + at.y() * place.left + at.x() * place.front).transpose();
     }
+  }
+  if (issues.empty() && !layout.trousers.empty()) {
+    TOILE_TRY(const auto trousers, bend_trousers(garment, flat, sheet, frame, layout, params));
+    for (const auto& [v, at] : trousers) start.x.row(v) = at.transpose();
   }
   if (!issues.empty()) return issues;
   return start;
@@ -752,6 +746,13 @@ Result<Placed> place_as_given(const mesh::GarmentMesh& sewn, const mesh::Support
     TOILE_TRY(start, bend(garment, folded_flat, frame, layout, farther));
   }
   options.flattening = start.flattening;
+  for (const TrouserLeg& leg : layout.trousers) {
+    // Else the two layers between the thighs change places and tangle.
+    options.sides.panels.resize(garment.panels.size(), 0);
+    for (const TrouserPanel& panel : leg.panels) options.sides.panels[static_cast<std::size_t>(panel.panel)] = leg.side;
+    options.sides.x = frame.x_mid;
+    options.sides.below = frame.crotch;
+  }
   Placed placed;
   placed.garment = sewn;
   for (int fold : stuck) {

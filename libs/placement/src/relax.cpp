@@ -424,6 +424,16 @@ class Relaxation {
     if (gap < 0) x_.row(row) -= gap * wall.normal.transpose();
   }
 
+  void keep_sides() {
+    if (options_.sides.panels.empty()) return;
+    for (Eigen::Index v = 0; v < x_.rows(); ++v) {
+      const double side = options_.sides.panels[static_cast<std::size_t>(garment_.vertex_panel[v])];
+      if (side == 0 || x_(v, 1) > options_.sides.below) continue;
+      const double gap = side * (x_(v, 0) - options_.sides.x) - 0.5 * options_.thickness;
+      if (gap < 0) x_(v, 0) -= side * gap;
+    }
+  }
+
   void sweep_panel(std::size_t panel, double bending, bool forward) {
     if (bending > 0) {
       for (const Bend& bend : bends_[panel]) {
@@ -501,6 +511,7 @@ class Relaxation {
       x_.row(middle.b) -= gap * middle.wall->normal.transpose();
     }
     for (std::size_t i = 0; i < walls_.size(); ++i) keep_outside(i);
+    keep_sides();
   }
 
   // The edges with the largest strains, and a few rings around them: further sweeps there cost little and spare many of the whole.

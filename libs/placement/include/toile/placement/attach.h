@@ -1,4 +1,4 @@
-// Panels that stand on their seams (collars, hoods, flaps): they continue the panels that they are sewn to, following the
+// Panels that stand on their seams (collars, flaps): they continue the panels that they are sewn to, following the
 // support.
 #pragma once
 

@@ -29,6 +29,7 @@ struct LimbPoint {
   Eigen::Vector3d centre;  ///< centroid of the perpendicular section [m]
   double girth = 0;        ///< tape girth of that section [m]
   double radius = 0;       ///< largest distance of the section from its centre [m]
+  Points2 hull;            ///< of a leg's section, as Section::hull; empty on arms
 };
 
 struct Limb {

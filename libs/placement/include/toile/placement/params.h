@@ -27,7 +27,7 @@ enum class Region {
   leg,          ///< round the leg that its name or its seams say
   leg_left,
   leg_right,
-  attached,  ///< stands on its seams to panels that are placed before it (collars, hoods)
+  attached,  ///< stands on its seams to panels that are placed before it (collars)
 };
 
 }  // namespace toile::placement

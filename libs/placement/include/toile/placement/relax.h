@@ -15,6 +15,13 @@ namespace toile::placement {
 
 using mesh::Points3;
 
+/// Panels that stay on their side of a vertical plane x = const, below a height (trouser legs between the thighs).
+struct Sides {
+  std::vector<double> panels;  ///< by panel: +1 or -1, 0: free; or empty
+  double x = 0;                ///< of the plane [m]
+  double below = 0;            ///< [m]
+};
+
 struct RelaxOptions {
   double offset = 0.004;       ///< wanted distance of vertices from the support [m]
   std::vector<double> face_offsets;  ///< by face of the support, or empty: instead of `offset` where the closest point lies on it [m]
@@ -30,6 +37,7 @@ struct RelaxOptions {
   double seam = 0.05;          ///< part of a seam's gap that one sweep closes
   double bending = 0.1;        ///< part of a curvature that one sweep takes out, until polishing
   Points3 rolled;              ///< |V| x 3 or empty: bending up to the curvature there is free [m]
+  Sides sides;
   std::vector<Target> targets; ///< vertices drawn to places as seams that start closed are, until they let go
   std::function<void(double)> progress;  ///< called with 0..1 if given
 };
