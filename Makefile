@@ -1,6 +1,6 @@
 # The front door. `make help` lists what there is; CMake does the work in build/release.
 .DEFAULT_GOAL := help
-.PHONY: help deps configure tools tee skirt trousers jacket waistcoat test bench docs asan ubsan clean
+.PHONY: help deps configure tools tee skirt trousers jacket waistcoat softtop test bench docs asan ubsan clean
 BUILD := build/release
 JOBS ?= $(shell nproc)
 
@@ -10,6 +10,7 @@ help:
 	@echo 'make trousers the same for a pair of trousers, on a dress form with legs'
 	@echo 'make jacket   a man'"'"'s jacket, from pattern to layered shell, put on a dress form (not yet draped)'
 	@echo 'make waistcoat   the same of a waistcoat'
+	@echo 'make softtop  a convertible'"'"'s soft top, from the drawing of its frame to rest on the closed frame (not yet opened)'
 	@echo 'make test     build and run all tests'
 	@echo 'make bench    time the tee stage by stage, cutting, sewing and layering of up to a million triangles, placement,'
 	@echo '             and simulation beside Blender where that is installed'
@@ -26,7 +27,7 @@ configure: deps
 tools: configure
 	@cmake --build $(BUILD) --target tools -j $(JOBS)
 
-tee skirt trousers jacket waistcoat: tools
+tee skirt trousers jacket waistcoat softtop: tools
 	@$(BUILD)/bin/toile run pipelines/$@/pipeline.yaml --build build/garments -j $(JOBS)
 
 test: configure

@@ -12,7 +12,20 @@ using namespace toile;
 
 double degrees(double angle) { return angle * 180 / M_PI; }
 
+enum class What { frame, skin };
+
+}  // namespace
+
+template <>
+struct toile::Choices<What> {
+  static constexpr std::array names{std::pair{"frame", What::frame}, std::pair{"skin", What::skin}};
+};
+
+namespace {
+
 struct MechanismParams {
+  What surface = What::frame;
+  mechanism::SkinOptions skin;
   std::vector<double> times{0};
   std::vector<double> angles{0};
   mechanism::Profile profile = mechanism::Profile::smooth;
@@ -21,6 +34,8 @@ struct MechanismParams {
   double closure = 1e-9;
   std::string motion;
   static void describe(auto& f) {
+    f(&MechanismParams::surface, {.key = "surface", .doc = "frame: bars and bows; skin: cloth spread from bow to bow, as a closed shell from which toile-flatten takes a pattern"});
+    f(&MechanismParams::skin, {.key = "skin", .doc = "how the skin lies"});
     f(&MechanismParams::times, {.key = "times", .doc = "times of the rows of `angles`, increasing", .unit = "s"});
     f(&MechanismParams::angles, {.key = "angles", .doc = "angle of the driver from the drawn position at each of these times", .unit = "rad"});
     f(&MechanismParams::profile, {.key = "profile", .doc = "between rows: straight, or smooth (3u^2 - 2u^3, at rest at each row)"});
@@ -106,7 +121,14 @@ struct MechanismStage {
     run.report("least_conditioning", conditioning);
     const mechanism::Configuration& end = followed->back();
     for (std::size_t b = 0; b < linkage.bodies.size(); ++b) run.report("angle_" + linkage.bodies[b], degrees(end.poses[b].angle), "deg");
-    output.artefact = mechanism::moved(*frame, linkage, end);
+    if (params.surface == What::skin) {
+      auto skin = mechanism::skin_surface(linkage, end.poses, params.skin);
+      if (!skin) return placed(skin.issues());
+      run.report("skin_vertices", static_cast<std::size_t>(skin->x.rows()));
+      output.artefact = std::move(*skin);
+    } else {
+      output.artefact = mechanism::moved(*frame, linkage, end);
+    }
     return output;
   }
 };

@@ -168,6 +168,46 @@ TEST(frame, refuses_bars_without_a_direction) {
   EXPECT_EQ(codes(follow(l, {0})), "bad_range");
 }
 
+TEST(skin, is_a_closed_shell_over_the_bows) {
+  Linkage l = four_bar(0.4, {0.5, 0.3}, 0.5);
+  for (const double z : {0.8, 0.3, -0.1}) {
+    l.bows.push_back({.name = fmt::format("bow_{}", l.bows.size()), .body = "coupler", .at = {z, 0.5}, .half_width = 0.5, .crown = 0.08, .exponent = 2, .width = 0.04, .height = 0.02, .divisions = 20});
+  }
+  const SkinOptions options{.offset = 0.005, .overhang = 0.03, .thickness = 0.02, .cell = 0.01};
+  const mesh::SupportMesh skin = checked(skin_surface(l, {}, options));
+  EXPECT_TRUE(mesh::validate(skin).empty());
+  // Bows of one arch at one height: a cylinder over it. Everywhere outside the outer lines by the offset, measured square to the arch.
+  const double length = 0.9 + 2 * options.overhang;
+  double area = 0;
+  for (Eigen::Index f = 0; f < skin.faces.rows(); ++f) {
+    if (skin.face_region[f] != 0) continue;
+    const Vector3d a = skin.x.row(skin.faces(f, 0)), b = skin.x.row(skin.faces(f, 1)), c = skin.x.row(skin.faces(f, 2));
+    EXPECT_GT((b - a).cross(c - a).y(), 0);
+    area += (b - a).cross(c - a).norm() / 2;
+  }
+  double arc = 0;
+  const auto outer = [&](double x) {
+    const double slope = -2 * 0.08 * x / 0.25, d = 0.015 / std::hypot(1, slope);
+    return Vector2d(x - slope * d, 0.5 - 0.08 * x * x / 0.25 + d);
+  };
+  for (int i = 0; i < 2000; ++i) arc += (outer(-0.53 + 1.06 * (i + 1) / 2000) - outer(-0.53 + 1.06 * i / 2000)).norm();
+  EXPECT_NEAR(area, arc * length, 1e-3 * area);
+  for (const auto& [name, at] : skin.landmarks) {
+    const Vector3d p(at[0], at[1], at[2]);
+    EXPECT_LT((skin.x.rowwise() - p.transpose()).rowwise().norm().minCoeff(), 0.011) << name;
+  }
+  // The same from the rear to the front, and on moved bodies.
+  std::reverse(l.bows.begin(), l.bows.end());
+  EXPECT_TRUE(mesh::validate(checked(skin_surface(l, {}, options))).empty());
+  const Configuration c = checked(follow(l, {0.3})).front();
+  const mesh::SupportMesh there = checked(skin_surface(l, c.poses, options));
+  const Vector2d p = moved(c.poses[1], {0.3, 0.515});
+  EXPECT_NEAR(there.landmarks.at("bow_1_10")[1], p.y() , 1e-12);
+  EXPECT_NEAR(there.landmarks.at("bow_1_10")[2], p.x() , 1e-12);
+  l.bows.resize(1);
+  EXPECT_EQ(codes(skin_surface(l, {}, options)), "no_skin");
+}
+
 TEST(motion, runs_through_its_rows) {
   const std::vector<double> times{0, 1, 3}, angles{0, 0.5, -0.5};
   EXPECT_EQ(angle_at(times, angles, Profile::straight, -1), 0);

@@ -37,6 +37,28 @@ struct Surface {
   }
 };
 
+/// The section of a bow at u, from -1 (right end) to 1.
+struct Section {
+  Vector3d centre, thick, wide;  ///< unit: square to the section's width, outwards; along its width
+};
+
+Section section(const Bow& bow, double u) {
+  const double x = u * bow.half_width, drop = bow.crown * std::pow(std::abs(u), bow.exponent);
+  const double slope = -bow.crown * bow.exponent * std::pow(std::abs(u), bow.exponent - 1) / bow.half_width * (u < 0 ? -1 : 1);
+  // Square to the arch, outwards; and along the car, turned by the pitch about it.
+  const Vector3d along = Vector3d(1, slope, 0).normalized(), forward = Vector3d::UnitZ(), out = forward.cross(along);
+  const double c = std::cos(bow.pitch), s = std::sin(bow.pitch);
+  return {Vector3d(x, bow.at[1] - drop, bow.at[0]), c * out - s * forward, c * forward + s * out};
+}
+
+/// u of a bow's landmark.
+double share(const Bow& bow, int i) { return 2.0 * i / bow.divisions - 1; }
+
+Vector3d in_pose(const Pose& pose, const Vector3d& p) {
+  const Vector2d q = moved(pose, {p.z(), p.y()});
+  return {p.x(), q.y(), q.x()};
+}
+
 /// (z, y) at a distance x from the car's middle plane.
 Vector3d in_car(double x, const Vector2d& p) { return {x, p.y(), p.x()}; }
 
@@ -104,14 +126,7 @@ Result<mesh::SupportMesh> frame_surface(const Linkage& linkage) {
     const int body = body_of(bow.body);
     std::vector<std::vector<Vector3d>> rings;
     for (int i = 0; i <= bow.divisions; ++i) {
-      const double u = 2.0 * i / bow.divisions - 1, x = u * bow.half_width;
-      const double drop = bow.crown * std::pow(std::abs(u), bow.exponent);
-      const double slope = -bow.crown * bow.exponent * std::pow(std::abs(u), bow.exponent - 1) / bow.half_width * (u < 0 ? -1 : 1);
-      const Vector3d centre(x, bow.at[1] - drop, bow.at[0]);
-      // Square to the arch, outwards; and along the car, turned by the pitch about it.
-      const Vector3d along = Vector3d(1, slope, 0).normalized();
-      const Vector3d forward = Vector3d::UnitZ(), out = forward.cross(along);
-      const Vector3d wide = std::cos(bow.pitch) * forward + std::sin(bow.pitch) * out, thick = std::cos(bow.pitch) * out - std::sin(bow.pitch) * forward;
+      const auto [centre, thick, wide] = section(bow, share(bow, i));
       std::vector<Vector3d> ring;
       for (int k = 0; k < bow.sides; ++k) {
         const double phi = 2 * M_PI * k / bow.sides;
@@ -132,25 +147,113 @@ Result<mesh::SupportMesh> frame_surface(const Linkage& linkage) {
   return result;
 }
 
+Result<mesh::SupportMesh> skin_surface(const Linkage& linkage, const std::vector<Pose>& poses, const SkinOptions& options) {
+  if (linkage.bows.size() < 2) return Issue{"no_skin", {.item = "bows"}, fmt::format("{} bows carry no skin", linkage.bows.size()), "give two bows at least, in the order in which the cloth runs over them"};
+  const auto outer = [&](const Bow& bow, double u) -> Vector3d {
+    const Section s = section(bow, u);
+    const Vector3d p = s.centre + (0.5 * bow.height + options.offset) * s.thick;
+    const auto body = static_cast<std::size_t>(std::find(linkage.bodies.begin(), linkage.bodies.end(), bow.body) - linkage.bodies.begin());
+    return poses.empty() || body == linkage.bodies.size() ? p : in_pose(poses[body], p);
+  };
+  double widest = 0;
+  for (const Bow& bow : linkage.bows) widest = std::max(widest, bow.half_width);
+  const int columns = 2 * std::max(1, static_cast<int>(std::ceil((widest + options.overhang) / options.cell)));
+  // One row of points a bow, and rows between.
+  std::vector<std::vector<Vector3d>> bows, rows;
+  for (const Bow& bow : linkage.bows) {
+    std::vector<Vector3d> row;
+    for (int i = 0; i <= columns; ++i) row.push_back(outer(bow, (2.0 * i / columns - 1) * (1 + options.overhang / bow.half_width)));
+    bows.push_back(std::move(row));
+  }
+  const auto beyond = [&](const std::vector<Vector3d>& last, const std::vector<Vector3d>& before) {
+    std::vector<Vector3d> row;
+    for (std::size_t i = 0; i < last.size(); ++i) row.push_back(last[i] + options.overhang * (last[i] - before[i]).normalized());
+    return row;
+  };
+  rows.push_back(beyond(bows[0], bows[1]));
+  for (std::size_t b = 0; b + 1 < bows.size(); ++b) {
+    double length = 0;
+    for (std::size_t i = 0; i < bows[b].size(); ++i) length = std::max(length, (bows[b + 1][i] - bows[b][i]).norm());
+    const int steps = std::max(1, static_cast<int>(std::ceil(length / options.cell)));
+    for (int k = 0; k < steps; ++k) {
+      std::vector<Vector3d> row;
+      for (std::size_t i = 0; i < bows[b].size(); ++i) row.push_back(bows[b][i] + static_cast<double>(k) / steps * (bows[b + 1][i] - bows[b][i]));
+      rows.push_back(std::move(row));
+    }
+  }
+  rows.push_back(bows.back());
+  rows.push_back(beyond(bows.back(), bows[bows.size() - 2]));
+
+  mesh::SupportMesh result;
+  result.region_names = {"outside", "inside"};
+  const int across = columns + 1, count = static_cast<int>(rows.size()), layer = across * count;
+  result.x.resize(2 * layer, 3);
+  for (int r = 0; r < count; ++r) {
+    for (int i = 0; i < across; ++i) {
+      const Vector3d& p = rows[static_cast<std::size_t>(r)][static_cast<std::size_t>(i)];
+      result.x.row(r * across + i) = p.transpose();
+      result.x.row(layer + r * across + i) = (p - options.thickness * Vector3d::UnitY()).transpose();
+    }
+  }
+  std::vector<std::array<int, 3>> faces;
+  std::vector<int> regions;
+  const auto quad = [&](int a, int b, int c, int d, int region, bool turned) {
+    if (turned) {
+      faces.insert(faces.end(), {{a, b, d}, {b, c, d}});
+    } else {
+      faces.insert(faces.end(), {{a, b, c}, {a, c, d}});
+    }
+    regions.insert(regions.end(), {region, region});
+  };
+  // Rows run rearwards, columns from right to left: this order looks up. Diagonals are mirrored left and right.
+  for (int r = 0; r + 1 < count; ++r) {
+    for (int i = 0; i + 1 < across; ++i) {
+      const int a = r * across + i, b = a + 1, c = a + across + 1, d = a + across;
+      const bool left = i >= columns / 2;
+      quad(a, d, c, b, 0, left);
+      quad(layer + a, layer + b, layer + c, layer + d, 1, !left);
+    }
+  }
+  for (int i = 0; i + 1 < across; ++i) {
+    const int a = i, b = i + 1, c = (count - 1) * across + i, d = c + 1;
+    const bool left = i >= columns / 2;
+    quad(a, b, layer + b, layer + a, 1, left);
+    quad(d, c, layer + c, layer + d, 1, !left);
+  }
+  for (int r = 0; r + 1 < count; ++r) {
+    const int a = r * across, b = a + across, c = a + columns, d = b + columns;
+    quad(b, a, layer + a, layer + b, 1, true);
+    quad(c, d, layer + d, layer + c, 1, false);
+  }
+  if (mesh::volume(result.x, Eigen::Map<const mesh::Triangles>(faces.front().data(), static_cast<Eigen::Index>(faces.size()), 3)) < 0) {
+    for (auto& face : faces) std::swap(face[1], face[2]);  // bows listed from the rear to the front
+  }
+  result.faces = Eigen::Map<const mesh::Triangles>(faces.front().data(), static_cast<Eigen::Index>(faces.size()), 3);
+  result.face_region = Eigen::Map<const mesh::Ids>(regions.data(), static_cast<Eigen::Index>(regions.size()));
+  for (const Bow& bow : linkage.bows) {
+    for (int i = 0; i <= bow.divisions; ++i) {
+      const Vector3d p = outer(bow, share(bow, i));
+      result.landmarks[fmt::format("{}_{}", bow.name, i)] = {p.x(), p.y(), p.z()};
+    }
+  }
+  return result;
+}
+
 mesh::SupportMesh moved(const mesh::SupportMesh& frame, const Linkage& linkage, const Configuration& configuration) {
   mesh::SupportMesh result = frame;
   const auto pose_of = [&](int region) -> Pose {
     const auto it = std::find(linkage.bodies.begin(), linkage.bodies.end(), frame.region_names[static_cast<std::size_t>(region)]);
     return it == linkage.bodies.end() ? Pose{} : configuration.poses[static_cast<std::size_t>(it - linkage.bodies.begin())];
   };
-  const auto move = [](const Pose& pose, const Vector3d& p) {
-    const Vector2d q = moved(pose, {p.z(), p.y()});
-    return Vector3d(p.x(), q.y(), q.x());
-  };
   for (Eigen::Index f = 0; f < frame.faces.rows(); ++f) {
     const Pose pose = pose_of(frame.face_region[f]);
-    for (const int v : frame.faces.row(f)) result.x.row(v) = move(pose, frame.x.row(v)).transpose();
+    for (const int v : frame.faces.row(f)) result.x.row(v) = in_pose(pose, frame.x.row(v)).transpose();
   }
   for (const Bow& bow : linkage.bows) {
     const int region = static_cast<int>(std::find(frame.region_names.begin(), frame.region_names.end(), bow.body) - frame.region_names.begin());
     for (int i = 0; i <= bow.divisions; ++i) {
       auto& at = result.landmarks.at(fmt::format("{}_{}", bow.name, i));
-      const Vector3d p = move(pose_of(region), {at[0], at[1], at[2]});
+      const Vector3d p = in_pose(pose_of(region), {at[0], at[1], at[2]});
       at = {p.x(), p.y(), p.z()};
     }
   }

@@ -12,6 +12,25 @@ namespace toile::mechanism {
 /// error  "bad_bar" for a bar that turns back on itself or whose points coincide
 Result<mesh::SupportMesh> frame_surface(const Linkage& linkage);
 
+/// The surface of cloth spread from bow to bow, in their order, as a closed shell.
+struct SkinOptions {
+  double offset = 0.003;     ///< of the outside from the outer lines of the bows [m]
+  double overhang = 0.03;    ///< beyond the first and last bow and beyond the ends of all [m]
+  double thickness = 0.03;   ///< of the shell, downwards [m]
+  double cell = 0.02;        ///< largest edge of its grid along the rulings, and across [m]
+  static void describe(auto& f) {
+    f(&SkinOptions::offset, {.key = "offset", .doc = "of its outside from the outer lines of the bows", .unit = "m", .min = 0, .max = 1});
+    f(&SkinOptions::overhang, {.key = "overhang", .doc = "beyond the first and last bow and beyond the ends of all", .unit = "m", .min = 1e-4, .max = 1});
+    f(&SkinOptions::thickness, {.key = "thickness", .doc = "of the shell, downwards", .unit = "m", .min = 1e-4, .max = 1});
+    f(&SkinOptions::cell, {.key = "cell", .doc = "largest edge of its grid along the rulings, and across", .unit = "m", .min = 1e-3, .max = 1});
+  }
+};
+/// Straight rulings between neighbouring bows, their points matched by the part of the half width. Regions `outside` and `inside`, landmarks along
+/// the bows as on the frame, on the outside (to within the chords of the grid).
+/// poses  of the bodies; empty: the drawn position
+/// error  "no_skin" where there are fewer than two bows
+Result<mesh::SupportMesh> skin_surface(const Linkage& linkage, const std::vector<Pose>& poses, const SkinOptions& options);
+
 /// x -> rotation x + shift in space, of a pose in the drawing's plane. The quaternion (w, x, y, z) turns about x.
 struct RigidPose {
   std::array<double, 4> rotation{1, 0, 0, 0};
