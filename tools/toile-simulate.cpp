@@ -14,7 +14,7 @@ struct SimulateStage {
 
   static stage::Description description() {
     return {.name = "toile-simulate",
-            .version = 8,
+            .version = 9,
             .summary = "Lets a placed garment hang to rest on a body, or move in time.",
             .example = "toile-simulate placed.ply --support form.ply -o draped.ply",
             .details = "Open seams are drawn together first; then the garment relaxes until the sum of all net forces is a given part of its "
@@ -50,6 +50,7 @@ struct SimulateStage {
       for (int c = 0; c < 3; ++c) run.report(fmt::format("force_{}_{}", axes[static_cast<std::size_t>(c)], r.name), r.force[c], "N");
       for (int c = 0; c < 3; ++c) run.report(fmt::format("moment_{}_{}", axes[static_cast<std::size_t>(c)], r.name), r.moment[c], "N*m");
     }
+    for (const auto& [name, force] : report.distance_forces) run.report("distance_force_" + name, force, "N");
     run.report("max_strain_warp", report.strain_warp_max);
     run.report("max_strain_weft", report.strain_weft_max);
     run.report("max_shear", report.shear_max, "rad");

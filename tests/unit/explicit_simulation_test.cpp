@@ -118,6 +118,37 @@ TEST(explicit_simulation, says_what_step_is_stable) {
   EXPECT_NE(to_string(result.issues().front()).find("certainly stable"), std::string::npos) << to_string(result.issues().front());
 }
 
+/// A free corner swings about a held one at a distance shorter than the cloth between them.
+TEST(explicit_simulation, holds_two_points_at_a_distance) {
+  mesh::GarmentMesh g = slack_cloth(8, 2);
+  g.points.push_back({0, "held", 0});
+  g.points.push_back({0, "free", 8});
+  SimulationParams params = particle_params(Integrator::provot);
+  params.fixed = {"sheet.left"};
+  params.mode = Mode::motion;
+  params.duration = 0.15;
+  const double start = (g.x.row(0) - g.x.row(8)).norm();
+  for (const double factor : {1.0, 0.9}) {
+    params.distances = {{"tie", {"sheet.held", "sheet.free"}, factor == 1.0 ? std::nullopt : std::optional(factor * start)}};
+    EXPECT_TRUE(validate(params).empty());
+    const auto result = simulate(g, std::nullopt, params);
+    ASSERT_TRUE(result);
+    EXPECT_NEAR((result->garment.x.row(0) - result->garment.x.row(8)).norm() / (factor * start), 1, 1e-4);
+    ASSERT_EQ(result->report.distance_forces.size(), 1U);
+    EXPECT_EQ(result->report.distance_forces[0].first, "tie");
+    EXPECT_NE(result->report.distance_forces[0].second, 0);
+    if (factor == 1.0) {  // a tie that is too long at first throws the corner inwards
+      EXPECT_LT(result->garment.x(8, 1), -0.03);
+    }
+  }
+  params.distances[0].between[1] = "sheet.held";
+  EXPECT_FALSE(simulate(g, std::nullopt, params));
+  params.distances[0].between[1] = "sheet.right";
+  EXPECT_FALSE(simulate(g, std::nullopt, params));
+  params.integrator = Integrator::implicit;
+  EXPECT_EQ(validate(params).size(), 1U);
+}
+
 /// One edge is held, the other driven out and back on a path; the reactions carry the weight.
 TEST(explicit_simulation, drives_an_edge_and_records_reactions) {
   const mesh::GarmentMesh g = slack_cloth(8, 2);

@@ -206,6 +206,29 @@ TEST(Motion, AVaneTurnsIntoTheWind) {
   }
 }
 
+/// Cloth strikes a ball and comes to lie on it: nothing passes through, steps converge, and the strike makes no energy.
+TEST(Motion, FallsOnABall) {
+  const mesh::SupportMesh ball = fixtures::ellipsoid({0.08, 0.08, 0.08}, {0, 0, 0}, 20, 32);
+  const GarmentMesh g = fixtures::sheet(24, 24, 0.24, 0.24, fixtures::shirting(), [](double u, double v) { return Eigen::Vector3d(u - 0.12, 0.1, 0.12 - v); });
+  for (const Integrator integrator : {Integrator::implicit, Integrator::automatic}) {
+    SimulationParams params;
+    params.mode = Mode::motion;
+    params.integrator = integrator;
+    params.duration = 0.4;
+    set_thread_count(1);
+    const auto result = simulate(g, ball, params);
+    set_thread_count(0);
+    ASSERT_TRUE(result);
+    EXPECT_EQ(result->report.intersections, 0);
+    EXPECT_EQ(result->report.support_intersections, 0);
+    EXPECT_EQ(result->report.inside, 0);
+    EXPECT_LT(result->report.strain_warp_99, 0.02);
+    const std::vector<double> total = column(result->log, "total_J"), potential = column(result->log, "potential_J");
+    for (double e : total) EXPECT_LT(e, total.front() + 0.02 * std::abs(potential.front() - potential.back()));
+    std::printf("%s: %d iterations in %zu steps, %d not converged\n", integrator == Integrator::implicit ? "euler" : "bdf2", result->report.iterations, total.size(), result->report.unconverged_steps);
+  }
+}
+
 TEST(Motion, CombinationsWithoutMeaningAreRefused) {
   SimulationParams params;
   params.integrator = Integrator::bdf2;

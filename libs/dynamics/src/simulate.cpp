@@ -177,6 +177,7 @@ class Run {
   };
   std::vector<Load> loads_;
   std::vector<std::pair<std::string, Selected>> watched_;
+  std::vector<std::array<int, 2>> distance_vertices_;
   std::vector<int> directed_vertices_;
   std::vector<int> holder_;    // |nodes|: index into held_, or -1
   std::vector<char> fixed_;    // |nodes|: all directions held
@@ -413,6 +414,20 @@ Issues Run::find_constraints() {
     } else {
       append(issues, selected.issues());
     }
+  }
+  for (const DistanceSpec& spec : params_.distances) {
+    std::array<int, 2> ends{};
+    for (std::size_t k = 0; k < 2; ++k) {
+      Result<Selected> selected = select(garment_, {{spec.between[k]}, 0, 1, {}}, "distance to " + spec.between[k]);
+      if (!selected) {
+        append(issues, selected.issues());
+      } else if (selected->vertices.size() != 1) {
+        issues.push_back(Issue{"bad_reference", {.item = "distance to " + spec.between[k]}, "is not one point", "name a point, panel.point"});
+      } else {
+        ends[k] = selected->vertices.front();
+      }
+    }
+    distance_vertices_.push_back(ends);
   }
   for (const std::string& name : params_.watch) {
     Result<Selected> selected = select(garment_, {{name}, 0, 1, {}}, "watch " + name);
@@ -975,7 +990,7 @@ void Run::move_in_time() {
     start_ = x_;
     for (std::size_t k = 0; k < nodes; ++k) {
       const auto row = static_cast<Eigen::Index>(k);
-      if (params_.integrator == Integrator::bdf2 && i > 0 && !touched[k] && !touching[k]) {
+      if (params_.integrator != Integrator::implicit && i > 0 && !touched[k] && !touching[k]) {
         velocity_rate_[row] = 1.5 / h;
         velocity_origin_.row(row) = (4 * x_.row(row) - before.row(row)) / 3;
         inertia_.row(row) = velocity_origin_.row(row) + 2 * h / 9 * (4 * velocity_.row(row) - velocity_before.row(row));
@@ -1122,6 +1137,14 @@ Issues Run::integrate_explicitly() {
       }
     }
   }
+  for (std::size_t k = 0; k < distance_vertices_.size(); ++k) {
+    const int a = sheet_.node_of_vertex[distance_vertices_[k][0]], b = sheet_.node_of_vertex[distance_vertices_[k][1]];
+    const double distance = params_.distances[k].distance.value_or((x_.row(a) - x_.row(b)).norm());
+    if (a == b || !(distance > 0)) {
+      return {Issue{"bad_constraint", {.item = "distance to " + params_.distances[k].between[0]}, "its two points are one", "name two points that are apart"}};
+    }
+    system.constraints.distances.push_back({a, b, distance});
+  }
   Provot provot(std::move(system), {x_, velocity_, 0}, options);
 
   // Nothing that is not in the list can touch before a node has moved half the skin. Then the straight ways since the last look
@@ -1209,6 +1232,10 @@ Issues Run::integrate_explicitly() {
     evaluate(x_, true);
     report_.residual = static_residual();
     return {};
+  }
+  for (std::size_t k = 0; k < params_.distances.size() && report_.iterations > 0; ++k) {
+    const DistanceSpec& spec = params_.distances[k];
+    report_.distance_forces.emplace_back(spec.name.empty() ? spec.between[0] : spec.name, provot.constraints().distance_force(k));
   }
   // The end goes through the same check as all that was before it.
   x_ = search_->limit_step(checked, provot.state().x, support_x_, support_x_, limit_options).x;

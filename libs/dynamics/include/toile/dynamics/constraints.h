@@ -110,6 +110,23 @@ struct LoadSpec {
   }
 };
 
+/// Two points that stay at a distance from each other.
+struct DistanceSpec {
+  std::string name;
+  std::vector<std::string> between;
+  std::optional<double> distance;
+
+  static void describe(auto& f) {
+    using Spec = DistanceSpec;
+    f(&Spec::name, {.key = "name", .doc = "name in the summary; not given: the first point"});
+    f(&Spec::between, {.key = "between", .doc = "two points, panel.point", .required = true});
+    f(&Spec::distance, {.key = "distance", .doc = "that they are held at; not given: that of the start", .unit = "m", .min = 1e-6, .max = 1e3});
+    f.check([](const Spec& s, Issues& issues) {
+      if (s.between.size() != 2) issues.push_back({"bad_constraint", {.item = "between"}, "a distance is between two points", "name two"});
+    });
+  }
+};
+
 /// Vertices with the part that each has in the whole: by length along edges, by area in panels, evenly for points.
 struct Selected {
   std::vector<int> vertices;    ///< each once, in increasing order

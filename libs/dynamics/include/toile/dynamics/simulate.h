@@ -16,7 +16,7 @@ namespace toile::dynamics {
 
 enum class Mode { equilibrium, motion };
 enum class Model { woven, particle };
-enum class Integrator { implicit, bdf2, provot };
+enum class Integrator { automatic, implicit, bdf2, provot };
 enum class YarnFriction { no, yes };
 
 struct SimulationParams {
@@ -25,7 +25,7 @@ struct SimulationParams {
   mechanics::EdgeEstimate edge_estimate = mechanics::EdgeEstimate::van_gelder;
   mechanics::Modulus modulus = mechanics::Modulus::secant;
   YarnFriction internal_friction = YarnFriction::no;
-  Integrator integrator = Integrator::implicit;
+  Integrator integrator = Integrator::automatic;
   std::optional<double> explicit_step;
   std::optional<double> explicit_damping;
   double settling_time = 5;
@@ -58,6 +58,7 @@ struct SimulationParams {
   double largest_move = 0.02;
   std::vector<std::string> fixed;
   std::vector<ConstraintSpec> constraints;
+  std::vector<DistanceSpec> distances;
   std::vector<LoadSpec> loads;
   std::vector<std::string> watch;
   std::string record;
@@ -70,7 +71,7 @@ struct SimulationParams {
     f(&SimulationParams::modulus, {.key = "modulus", .doc = "model particle: slope of the tensile curve that its springs take; secant is the published one"});
     f(&SimulationParams::internal_friction, {.key = "internal_friction", .doc = "model woven: yes: friction between yarns in bending, shear and tension, as the loops of the fabric's tests show it (2HB, 2HG, 2HG5, RT); its state is kept "
                                               "in the garment (docs/mechanics.md#internal-friction). no: the elastic curves alone"});
-    f(&SimulationParams::integrator, {.key = "integrator", .doc = "implicit: Euler; bdf2: motion with two steps' memory, second order, hardly damps by itself; provot: explicit, velocities then positions, constraints and contacts by dynamic constraints (docs/simulation.md#explicit-integration)"});
+    f(&SimulationParams::integrator, {.key = "integrator", .doc = "automatic: bdf2 in motion, else implicit; implicit: Euler; bdf2: motion with two steps' memory, second order, hardly damps by itself; provot: explicit, velocities then positions, constraints and contacts by dynamic constraints (docs/simulation.md#explicit-integration)"});
     f(&SimulationParams::explicit_step, {.key = "explicit_step", .doc = "integrator provot: time step; not given: two fifths of the step that is certainly stable", .unit = "s", .min = 1e-9, .max = 1});
     f(&SimulationParams::explicit_damping, {.key = "explicit_damping", .doc = "integrator provot: force against velocity per mass; not given: 10/s in equilibrium, none in motion", .unit = "1/s", .min = 0, .max = 1e5});
     f(&SimulationParams::settling_time, {.key = "settling_time", .doc = "integrator provot, equilibrium: simulated time after the last row of a path, load or gravity table, after which the run ends unconverged (exit code 5)", .unit = "s", .min = 1e-6, .max = 1e4});
@@ -109,6 +110,7 @@ struct SimulationParams {
     f(&SimulationParams::largest_move, {.key = "largest_move", .doc = "equilibrium: no particle moves farther in one iteration", .unit = "m", .min = 1e-4, .max = 1});
     f(&SimulationParams::fixed, {.key = "fixed", .doc = "edges and points (panel.edge, panel.point) that are held where they are; short for a constraint of kind pin"});
     f(&SimulationParams::constraints, {.key = "constraints", .doc = "what is clamped, pinned, guided or driven; a particle named twice follows the first"});
+    f(&SimulationParams::distances, {.key = "distances", .doc = "integrator provot: pairs of points that stay at a distance, by dynamic constraints"});
     f(&SimulationParams::loads, {.key = "loads", .doc = "forces on edges, points and regions"});
     f(&SimulationParams::watch, {.key = "watch", .doc = "edges, points and panels whose mean position the record has"});
     f(&SimulationParams::record, {.key = "record", .doc = "CSV file with one row per increment or time step: paths, reaction forces and moments, watched positions, energies; empty: none", .local = true});
@@ -132,6 +134,7 @@ struct SimulationParams {
       if (p.internal_friction == YarnFriction::yes && (p.model == Model::particle || p.integrator == Integrator::provot)) {
         bad("internal_friction", "only model woven with an implicit integrator has friction between yarns", "leave internal_friction at no, or change model and integrator");
       }
+      if (!p.distances.empty() && p.integrator != Integrator::provot) bad("distances", "only integrator provot holds distances", "write `integrator: provot`, or join the points by a trim or fastener");
       for (const ConstraintSpec& c : p.constraints) {
         if (c.kind == Hold::clamp && (p.model == Model::particle || p.integrator == Integrator::provot)) {
           bad("constraints", "kind clamp holds tangent planes, which only model woven with the implicit integrator has", "hold two rows of particles with kind pin and a region");
@@ -171,6 +174,7 @@ struct SimulationReport {
   int seams_open = 0;             ///< particle pairs not closed
   int unconverged_steps = 0;      ///< motion: time steps that ended before their energy was low enough
   std::vector<Reaction> reactions;
+  std::vector<std::pair<std::string, double>> distance_forces;  ///< of held distances at the end; positive: pushes the two apart [N]
   int start_inside = 0, start_intersections = 0;
   double start_move = 0;          ///< farthest that a particle was pushed out of the support at the start [m]
   int intersections = 0, support_intersections = 0, inside = 0;  ///< at the end, by the exact test
@@ -200,7 +204,7 @@ struct toile::Choices<toile::dynamics::Model> {
 };
 template <>
 struct toile::Choices<toile::dynamics::Integrator> {
-  static constexpr std::array names{std::pair{"implicit", toile::dynamics::Integrator::implicit}, std::pair{"bdf2", toile::dynamics::Integrator::bdf2}, std::pair{"provot", toile::dynamics::Integrator::provot}};
+  static constexpr std::array names{std::pair{"automatic", toile::dynamics::Integrator::automatic}, std::pair{"implicit", toile::dynamics::Integrator::implicit}, std::pair{"bdf2", toile::dynamics::Integrator::bdf2}, std::pair{"provot", toile::dynamics::Integrator::provot}};
 };
 template <>
 struct toile::Choices<toile::dynamics::YarnFriction> {
