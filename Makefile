@@ -1,6 +1,6 @@
 # The front door. `make help` lists what there is; CMake does the work in build/release.
 .DEFAULT_GOAL := help
-.PHONY: help deps configure tools tee skirt trousers jacket waistcoat softtop test bench docs asan ubsan clean
+.PHONY: help deps configure tools tee skirt trousers jacket waistcoat softtop test validate bench docs asan ubsan clean
 BUILD := build/release
 JOBS ?= $(shell nproc)
 
@@ -12,6 +12,7 @@ help:
 	@echo 'make waistcoat   the same of a waistcoat'
 	@echo 'make softtop  a convertible'"'"'s soft top, from the drawing of its frame to rest on the closed frame (not yet opened)'
 	@echo 'make test     build and run all tests'
+	@echo 'make validate   the virtual laboratory: tests of textiles and shells against theory, report in build/validation'
 	@echo 'make bench    time the tee stage by stage, cutting, sewing and layering of up to a million triangles, placement,'
 	@echo '             and simulation beside Blender where that is installed'
 	@echo 'make docs     write docs/stages/ from the programs'
@@ -33,6 +34,10 @@ tee skirt trousers jacket waistcoat softtop: tools
 test: configure
 	@cmake --build $(BUILD) -j $(JOBS)
 	@ctest --test-dir $(BUILD) --output-on-failure -j $(JOBS)
+
+validate: tools
+	@$(BUILD)/bin/toile-lab -o build/validation/report.json --page build/validation/validation.md --plots build/validation/plots \
+	  --work build/validation/runs --jobs $(JOBS)
 
 bench: deps
 	@cmake --preset release -DTOILE_BENCH=ON

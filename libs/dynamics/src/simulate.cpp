@@ -15,6 +15,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <set>
@@ -227,17 +228,45 @@ Eigen::Vector3d vector(const Float4& v) { return {static_cast<double>(v[0]), sta
 mechanics::YarnGradient tangents(const GarmentMesh& garment, const Sheet& sheet, const Points3& x, const std::vector<std::vector<int>>& faces_of_vertex, int vertex) {
   mechanics::YarnGradient sum{Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
   double area = 0;
+  std::set<int> ring;
   for (int f : faces_of_vertex[static_cast<std::size_t>(vertex)]) {
     const mechanics::YarnGradient g = mechanics::yarn_gradient(sheet, x, static_cast<std::size_t>(f));
     const double a = sheet.shapes[static_cast<std::size_t>(f)].area;
     sum.weft += a * g.weft;
     sum.warp += a * g.warp;
     area += a;
+    for (int k = 0; k < 3; ++k) ring.insert(garment.faces(f, k));
   }
   TOILE_CHECK(area > 0, "vertex {} of {} is in no face", vertex, garment.vertex_count());
-  return {sum.weft / area, sum.warp / area};
+  const mechanics::YarnGradient mean{sum.weft / area, sum.warp / area};
+  // Of the quadratic surface through the vertex that fits its neighbours and theirs best, so that a clamp at the border of a curved start
+  // has the tangent of its end and not that of half a cell inside; the mean over the triangles where they do not tell one.
+  std::set<int> patch = ring;
+  const double scale = std::sqrt(area);
+  for (int growth = 0; growth < 3; ++growth) {
+    const std::vector<int> grown(patch.begin(), patch.end());
+    for (int v : grown) {
+      for (int f : faces_of_vertex[static_cast<std::size_t>(v)]) {
+        for (int k = 0; k < 3; ++k) patch.insert(garment.faces(f, k));
+      }
+    }
+    if (patch.size() < 8) continue;
+    Eigen::MatrixXd terms(static_cast<Eigen::Index>(patch.size()) - 1, 5), values(static_cast<Eigen::Index>(patch.size()) - 1, 3);
+    Eigen::Index row = 0;
+    for (int v : patch) {
+      if (v == vertex) continue;
+      const Eigen::RowVector2d d = (garment.uv.row(v) - garment.uv.row(vertex)) / scale;
+      terms.row(row) << d.x(), d.y(), d.x() * d.x(), d.x() * d.y(), d.y() * d.y();
+      values.row(row++) = (x.row(sheet.node_of_vertex[v]) - x.row(sheet.node_of_vertex[vertex])) / scale;
+    }
+    Eigen::ColPivHouseholderQR<Eigen::MatrixXd> fit(terms);
+    fit.setThreshold(1e-3);
+    if (fit.rank() < 5) continue;
+    const Eigen::MatrixXd slopes = fit.solve(values);
+    return {slopes.row(0).transpose(), slopes.row(1).transpose()};
+  }
+  return mean;
 }
-
 
 Issues Run::build(const Ids& node_of_vertex) {
   mechanics::SheetOptions options;

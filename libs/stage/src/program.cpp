@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <set>
 
 #include "toile/base/hash.h"
 #include "toile/base/parallel.h"
@@ -136,8 +137,13 @@ class Program {
     }
     std::map<std::string, std::string> values;
     std::vector<std::string> names;
-    visit_options(*entry_.params, nullptr, "", [&](const std::string& name, const Field&, void*) { names.push_back(name); });
-    for (const std::string& name : names) app.add_option("--" + name, values[name])->expected(1);
+    std::set<std::string> flags;
+    visit_options(*entry_.params, nullptr, "", [&](const std::string& name, const Field& field, void*) {
+      names.push_back(name);
+      if (field.type.kind == ValueType::Kind::boolean) flags.insert(name);
+    });
+    // A flag may stand alone: --strict is --strict true.
+    for (const std::string& name : names) app.add_option("--" + name, values[name])->expected(flags.count(name) ? 0 : 1, 1);
     app.allow_extras();
     try {
       app.parse(argc_, argv_);
@@ -162,7 +168,7 @@ class Program {
       issues.push_back(usage(fmt::format("unknown option '{}'", extra), near ? fmt::format("did you mean '--{}'?", *near) : fmt::format("see {} --help", entry_.description.name)));
     }
     for (const std::string& name : names) {
-      if (app.count("--" + name)) options.params.emplace_back(name, values[name]);
+      if (app.count("--" + name)) options.params.emplace_back(name, flags.count(name) && values[name].empty() ? "true" : values[name]);
     }
     for (const Port& port : entry_.description.inputs) {
       if (!app.count("--" + port.name)) options.ports.erase(port.name);

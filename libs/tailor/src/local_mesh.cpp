@@ -1,6 +1,7 @@
 #include "local_mesh.h"
 
 #include "toile/base/result.h"
+#include "toile/base/rng.h"
 
 #include <algorithm>
 #include <cmath>
@@ -510,6 +511,38 @@ int split_edge(LocalMesh& mesh, int a, int b, const LocalVertex& vertex) {
     mesh.constraints.insert(ordered(m, b));
   }
   return m;
+}
+
+void jitter(LocalMesh& mesh, double amount, const std::function<Point(int curve, double s)>& curve_point) {
+  std::vector<char> held(mesh.vertices.size(), 0);
+  for (const auto& [a, b] : mesh.constraints) held[static_cast<std::size_t>(a)] = held[static_cast<std::size_t>(b)] = 1;
+  Rng rng(1);
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+    LocalVertex& vertex = mesh.vertices[v];
+    if (vertex.mobility == Mobility::fixed || held[v] || mesh.stars[v].empty()) continue;
+    const auto least = [&] {
+      double angle = 180;
+      for (int t : mesh.stars[v]) {
+        const Triple& c = mesh.triangles[static_cast<std::size_t>(t)];
+        angle = std::min(angle, smallest_angle(mesh.vertices[static_cast<std::size_t>(c[0])].p, mesh.vertices[static_cast<std::size_t>(c[1])].p, mesh.vertices[static_cast<std::size_t>(c[2])].p));
+      }
+      return angle;
+    };
+    const LocalVertex before = vertex;
+    const double enough = std::min(18.0, least());
+    Point move(rng.uniform(-amount, amount), rng.uniform(-amount, amount));
+    for (int trial = 0; trial < 4; ++trial, move *= 0.5) {
+      vertex = before;
+      if (vertex.mobility == Mobility::free) {
+        vertex.p += move;
+      } else {
+        vertex.s += move.x();
+        vertex.p = curve_point(vertex.curve, vertex.s);
+      }
+      if (least() >= enough) break;
+      vertex = before;
+    }
+  }
 }
 
 }  // namespace toile::tailor

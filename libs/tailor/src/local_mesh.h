@@ -55,6 +55,10 @@ struct ImproveOptions {
 /// bad triangles change. An angle between two border edges or constraints belongs to the outline and does not count.
 void improve(LocalMesh& mesh, const ImproveOptions& options);
 
+/// Moves free vertices by up to `amount` along either coordinate and sliding ones along their curve, the same way in every run. Vertices of
+/// constraints stay. A move is halved until it leaves no angle below 18 degrees that was not below before, and at last not made.
+void jitter(LocalMesh& mesh, double amount, const std::function<Point(int curve, double s)>& curve_point);
+
 /// Gives a triangle other vertices.
 void replace_triangle(LocalMesh& mesh, int triangle, const Triple& vertices);
 

@@ -69,6 +69,7 @@ Result<mesh::GarmentMesh> mesh_panels(const std::vector<pattern::CutPanel>& all_
     grid.diagonal = params.diagonal;
     grid.mesher = params.mesher;
     grid.turn = params.turn;
+    grid.jitter = params.jitter;
     // What is said of the panel itself goes before what is said of its piece.
     for (const std::string& name : {panel->piece, panel->name}) {
       const auto found = params.panels.find(name);
@@ -80,6 +81,7 @@ Result<mesh::GarmentMesh> mesh_panels(const std::vector<pattern::CutPanel>& all_
       grid.diagonal = own.diagonal.value_or(grid.diagonal);
       grid.mesher = own.mesher.value_or(grid.mesher);
       grid.turn = own.turn.value_or(grid.turn);
+      grid.jitter = own.jitter.value_or(grid.jitter);
     }
     grid.cell_warp *= params.scale;
     grid.cell_weft *= params.scale;
@@ -130,7 +132,7 @@ Result<mesh::GarmentMesh> mesh_panels(const std::vector<pattern::CutPanel>& all_
     if (!panels[p]->mirrored) continue;
     for (std::size_t q = 0; q < panels.size() && twin[p] < 0; ++q) {
       const bool same_grid = settings[p].cell_warp == settings[q].cell_warp && settings[p].cell_weft == settings[q].cell_weft &&
-                             settings[p].diagonal == settings[q].diagonal && settings[p].mesher == settings[q].mesher && settings[p].turn == settings[q].turn &&
+                             settings[p].diagonal == settings[q].diagonal && settings[p].mesher == settings[q].mesher && settings[p].turn == settings[q].turn && settings[p].jitter == settings[q].jitter &&
                              settings[p].cut == settings[q].cut && lines[p] == lines[q];
       if (panels[q]->piece == panels[p]->piece && !panels[q]->mirrored && same_grid) twin[p] = static_cast<int>(q);
     }

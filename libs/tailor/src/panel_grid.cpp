@@ -527,6 +527,7 @@ Result<PanelMesh> mesh_whole(const pattern::CutPanel& panel, const GridSettings&
   options.curve_point = [&](int curve, double s) { return cells(lines[static_cast<std::size_t>(curve)].curve.point_at(s * cells.reference())); };
   improve(local, options);
   if (settings.diagonal == Diagonal::shorter) take_shorter_diagonals(local, grid_cells, cells, options.target);
+  if (settings.jitter > 0) jitter(local, settings.jitter, options.curve_point);
 
   // Runs as they stand now, and the final numbering: border loops in order, then everything else.
   PanelMesh result;

@@ -17,6 +17,7 @@ struct GridSettings {
   Diagonal diagonal = Diagonal::alternating;
   Mesher mesher = Mesher::grid;
   double turn = 0.6;             ///< of the border from sample to sample [rad]
+  double jitter = 0;             ///< [cells]
   std::vector<std::string> cut;  ///< internal lines that are cut
 };
 

@@ -31,6 +31,7 @@ struct PanelGrid {
   std::optional<Diagonal> diagonal;
   std::optional<Mesher> mesher;
   std::optional<double> turn;  ///< [rad]
+  std::optional<double> jitter;
   static void describe(auto& f) {
     f(&PanelGrid::cell, {.key = "cell", .doc = "grid size along warp and weft", .unit = "m", .min = 1e-4, .max = 0.5});
     f(&PanelGrid::cell_warp, {.key = "cell_warp", .doc = "grid size along the warp", .unit = "m", .min = 1e-4, .max = 0.5});
@@ -38,6 +39,7 @@ struct PanelGrid {
     f(&PanelGrid::diagonal, {.key = "diagonal", .doc = "how a cell is cut into triangles"});
     f(&PanelGrid::mesher, {.key = "mesher", .doc = "grid or delaunay"});
     f(&PanelGrid::turn, {.key = "turn", .doc = "largest turn of border and lines from particle to particle", .unit = "rad", .min = 0.05, .max = 3.2});
+    f(&PanelGrid::jitter, {.key = "jitter", .doc = "parts of a cell by which particles are moved at random", .min = 0, .max = 0.3});
   }
 };
 
@@ -47,6 +49,7 @@ struct MeshParams {
   Diagonal diagonal = Diagonal::alternating;
   Mesher mesher = Mesher::grid;
   double turn = 0.6;
+  double jitter = 0;
   double scale = 1;
   std::map<std::string, PanelGrid> panels;
   std::vector<std::string> lines;
@@ -60,6 +63,8 @@ struct MeshParams {
     f(&MeshParams::diagonal, {.key = "diagonal", .doc = "how a cell is cut into triangles: alternating, single, or the shorter one where corners were moved"});
     f(&MeshParams::mesher, {.key = "mesher", .doc = "grid: particles on warp and weft lines; delaunay: as many without lines, for comparison"});
     f(&MeshParams::turn, {.key = "turn", .doc = "largest turn of border and lines from particle to particle; up to four a cell are set for it", .unit = "rad", .min = 0.05, .max = 3.2});
+    f(&MeshParams::jitter, {.key = "jitter", .doc = "moves particles at random by up to so many cells along warp and weft, those of the border along it, corners and named points not: "
+                                                    "for tests of what a result owes to its mesh", .min = 0, .max = 0.3});
     f(&MeshParams::scale, {.key = "scale", .doc = "all grid sizes, those of single panels too, times this: one spec for several resolutions", .min = 0.01, .max = 100});
     f(&MeshParams::panels, {.key = "panels", .doc = "settings of single panels, by the name of panel or piece"});
     f(&MeshParams::lines, {.key = "lines", .doc = "internal lines (panel.line) that become edges of the mesh; * stands for any letters"});

@@ -1,0 +1,322 @@
+// Tests of the shapes that cloth takes: lateral buckling, bending with friction, sliding, drape.
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "bench_setup.h"
+#include "toile/base/text.h"
+#include "toile/io/ply.h"
+#include "toile/lab/references.h"
+
+namespace toile::lab {
+namespace {
+
+constexpr double earth = 9.81;
+using std::numbers::pi;
+
+std::string common(Model model, double residual, int iterations) {
+  return fmt::format("model: {}\nself_reach: 0.1 mm\nresidual: {}\nmax_iterations: {}\nrecord: record.csv\n", name_of(model), format_number(residual), iterations);
+}
+
+// ----------------------------------------------------------------------------------------------------- lateral buckling
+
+Experiment buckling(const Scope& scope) {
+  Experiment e{.test = "lateral_buckling", .title = "Lateral buckling",
+               .about = "A strip of 200 mm stands on edge, clamped at one end, its weight in its plane; from Γ* = w L³/D11 on it tips over sideways ([Romero 2021](bibliography.md#romero2021)). Its end is pushed sideways by a small force at 80, "
+                        "85, 90 and 94 % of the reference; force over deflection, a function of Γ² since the strip buckles for either direction of gravity, is extrapolated to zero by a parabola. Reference: Rayleigh-Ritz, plate of degree 15 × 5 on plane stress of degree 14 × 7 (`libs/lab`)."};
+  struct Key {
+    Strip strip;
+    Cloth cloth;
+    double reference = 0;
+  };
+  std::vector<Key> keys;
+  const std::vector<double> parts{0.80, 0.85, 0.90, 0.94};
+  if (scope.woven && !scope.quick) {
+    for (const auto& [aspect, twist] : {std::pair{0.05, 0.5}, {0.2, 0.5}, {0.5, 0.5}, {1.0, 0.5}, {0.2, 0.25}}) {
+      for (const Net net : {Net::grid, Net::jittered}) {
+        if (net != Net::grid && aspect != 0.2) continue;
+        Key k{{.length = 0.2, .width = 0.2 * aspect, .warp = 0, .cell = aspect < 0.1 ? 0.0025 : aspect < 0.4 ? 0.005 : 0.01, .net = net},
+              {.force_max = 1000, .b_warp = 2e-4, .b_weft = 2e-4, .g = 5e4, .twist = twist}, lateral_buckling(aspect, twist)};
+        k.cloth.weight = k.reference * k.cloth.b_warp / (earth * std::pow(k.strip.length, 3));
+        const double push = 0.0135 * k.cloth.b_warp * k.strip.width / std::pow(k.strip.length, 2);
+        std::string spec = common(Model::woven, 2e-7, 6000) + fmt::format("gravity_direction: {}\ngravity_times: [0 s", vector_yaml(-across(k.strip)));
+        for (std::size_t i = 0; i < parts.size(); ++i) spec += fmt::format(", {} s", i + 1);
+        spec += "]\ngravity_factor: [0";
+        for (const double p : parts) spec += fmt::format(", {}", p);
+        spec += fmt::format("]\nincrements: {0}\nduration: {0} s\nwatch: [strip.tip]\nconstraints:\n  - {{name: clamp, on: [strip.clamp], kind: clamp}}\nloads:\n  - {{name: side, on: [strip.tip], force: [0 N, 0 N, {1} N]}}\n", parts.size(), format_number(push));
+        e.cases.push_back(strip_case(fmt::format("woven_{}_{}_{}", k.strip.file_name(), aspect, twist), k.strip, k.cloth, spec));
+        keys.push_back(k);
+      }
+    }
+  }
+  e.judge = [=](const std::vector<Outcome>& outcomes) {
+    Section section;
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+      const Key& k = keys[i];
+      Row row = row_of("lateral_buckling", fmt::format("w/L = {}, D66/D11 = {}", format_number(std::round(100 * k.strip.width / k.strip.length) / 100), k.cloth.twist), Model::woven, name_of(k.strip.net), "Γ*", "1", outcomes[i]);
+      row.reference = k.reference;
+      row.target = 0.02;
+      if (outcomes[i].ran && row_count(outcomes[i].record) == parts.size()) {
+        // Parabola of 1/z over the square of the load by least squares; its root beyond the last load.
+        Eigen::MatrixXd a(parts.size(), 3);
+        Eigen::VectorXd b(parts.size());
+        const double unit = watched(outcomes[i].record, "strip.tip", 0).z();
+        for (std::size_t n = 0; n < parts.size(); ++n) {
+          const double q = parts[n] * parts[n];
+          a.row(static_cast<Eigen::Index>(n)) << 1, q, q * q;
+          b[static_cast<Eigen::Index>(n)] = unit / watched(outcomes[i].record, "strip.tip", n).z();
+        }
+        const Eigen::Vector3d c = a.colPivHouseholderQr().solve(b);
+        const double root = (-c[1] - std::sqrt(c[1] * c[1] - 4 * c[2] * c[0])) / (2 * c[2]);
+        row.value = k.reference * std::sqrt(root);
+      }
+      section.rows.push_back(row);
+    }
+    return section;
+  };
+  return e;
+}
+
+// -------------------------------------------------------------------------------------------------- friction cantilever
+
+Experiment friction_cantilever(const Scope& scope) {
+  Experiment e{.test = "friction_cantilever", .title = "Cantilever with internal friction",
+               .about = "The cantilever with M = B κ + HB (HB half of 2HB), loaded once from straight in ten steps; η = HB L/B. It stays straight up to Γ = 2 η; reference integrated as for the elastica."};
+  const std::vector<std::pair<double, double>> keys_all{{10, 0.5}, {10, 1}, {10, 2}, {100, 2}};
+  std::vector<std::pair<double, double>> keys;
+  const Strip strip{.length = 0.08, .width = 0.015, .warp = 0, .cell = 0.0025};
+  if (scope.woven && !scope.quick) {
+    for (const auto& [gamma, eta] : keys_all) {
+      Cloth cloth{.b_warp = 2e-5, .b_weft = 2e-5};
+      cloth.weight = gamma * cloth.b_warp / (earth * std::pow(strip.length, 3));
+      cloth.hb_warp = cloth.hb_weft = 2 * eta * cloth.b_warp / strip.length;
+      std::string spec = common(Model::woven, 1e-4, 3000) + "gravity_direction: [0, 0, -1]\ngravity_times: [0 s, 10 s]\ngravity_factor: [0, 1]\nincrements: 10\nduration: 10 s\nwatch: [strip.tip, strip.clamp]\n" +
+                         (scope.internal_friction ? "internal_friction: true\n" : "") + "constraints:\n  - {name: clamp, on: [strip.clamp], kind: clamp}\n";
+      e.cases.push_back(strip_case(fmt::format("woven_gamma{}_eta{}", gamma, eta), strip, cloth, spec));
+      keys.push_back({gamma, eta});
+    }
+  }
+  e.judge = [=, friction = scope.internal_friction](const std::vector<Outcome>& outcomes) {
+    Section section;
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+      const auto& [gamma, eta] = keys[i];
+      Row row = row_of("friction_cantilever", fmt::format("Γ = {}, η = {}", gamma, eta), Model::woven, "grid", "drop over reach", "1", outcomes[i]);
+      const Cantilever exact = cantilever(gamma, eta);
+      row.reference = exact.drop / exact.reach;
+      row.target = 0.02;
+      if (outcomes[i].ran) {
+        const Table& r = outcomes[i].record;
+        const Eigen::Vector3d d = watched(r, "strip.tip", row_count(r) - 1) - watched(r, "strip.clamp", row_count(r) - 1);
+        row.value = -d.z() / d.dot(along(strip));
+        if (!friction) row.note = "the simulator has no internal friction yet";
+      }
+      section.rows.push_back(row);
+    }
+    return section;
+  };
+  return e;
+}
+
+// -------------------------------------------------------------------------------------------------------------- incline
+
+/// A box whose top is at this height, from -1 to 1 m.
+std::string box(double top) {
+  mesh::SupportMesh s;
+  s.x.resize(8, 3);
+  for (int k = 0; k < 8; ++k) s.x.row(k) << (k & 1 ? 1.0 : -1.0), (k & 2 ? 1.0 : -1.0), (k & 4 ? top : top - 0.2);
+  s.faces.resize(12, 3);
+  s.faces << 0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4, 2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5;
+  s.face_region = mesh::Ids::Constant(12, -1);
+  return io::format_support(s, io::Encoding::ascii);
+}
+
+Experiment incline(const Scope& scope) {
+  Experiment e{.test = "incline", .title = "Sliding on an incline",
+               .about = "A square of 100 mm of the suiting on a plane, friction 0.3, gravity turned until its slope is 0.9, 0.999, 1.001, 1.1 and 1.5 times that. Below, the cloth has to stay; above, the "
+                        "coefficient follows from its acceleration, μ = tan α − a/(g cos α), measured over the second half of a second."};
+  std::vector<double> keys;
+  const double mu = 0.3;
+  const Strip strip{.length = 0.1, .width = 0.1, .warp = 0, .cell = 0.01};
+  if (scope.woven && !scope.quick) {
+    for (const double part : {0.9, 0.999, 1.001, 1.1, 1.5}) {
+      const double a = std::atan(part * mu);
+      const Eigen::Vector3d down = std::sin(a) * along(strip) - std::cos(a) * Eigen::Vector3d::UnitZ();
+      std::string spec = fmt::format("mode: motion\nduration: 1 s\ntime_step: 0.01 s\nair_drag: 0\nnewton_iterations: 20\nnewton_residual: 0.001\nsupport_friction: {}\ngravity_direction: {}\nrecord: record.csv\nwatch: [strip]\n", mu, vector_yaml(down));
+      Case c = strip_case(fmt::format("woven_{}", part), strip, suiting(), spec);
+      c.files.push_back({"plane.ply", box(-0.0019)});
+      c.steps.back().args.insert(c.steps.back().args.begin() + 1, "plane.ply");
+      e.cases.push_back(c);
+      keys.push_back(part);
+    }
+  }
+  e.judge = [=](const std::vector<Outcome>& outcomes) {
+    Section section;
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+      const double part = keys[i], a = std::atan(part * mu);
+      Row row = row_of("incline", fmt::format("tan α = {} μ", part), Model::woven, "grid", part < 1 ? "creep in the last half second" : "μ", part < 1 ? "m" : "1", outcomes[i]);
+      row.converged = true;  // motion
+      row.reference = part < 1 ? 0 : mu;
+      row.measure = part < 1 ? Measure::absolute : Measure::relative;
+      row.target = part < 1 ? 1e-4 : 0.001;
+      const Table& r = outcomes[i].record;
+      const std::size_t n = row_count(r);
+      if (outcomes[i].ran && n > 20) {
+        const auto at = [&](std::size_t k) { return watched(r, "strip", k).dot(along(strip)); };
+        const auto time = r.at("time_s");
+        const std::size_t first = n / 2, last = n - 1, middle = (first + last) / 2;
+        if (part < 1) {
+          row.value = at(last) - at(first);
+        } else {
+          const double early = (at(middle) - at(first)) / (time[middle] - time[first]), late = (at(last) - at(middle)) / (time[last] - time[middle]);
+          const double acceleration = (late - early) / (0.5 * (time[last] - time[first]));
+          row.value = std::tan(a) - acceleration / (earth * std::cos(a));
+        }
+      }
+      section.rows.push_back(row);
+    }
+    return section;
+  };
+  return e;
+}
+
+// ---------------------------------------------------------------------------------------------------------------- drape
+
+struct Shadow {
+  double area = 0;  ///< [m2]
+  int nodes = 0;
+};
+
+/// Shadow of the garment on the plane z = 0, by half millimetres, and the waves of its rim.
+Shadow shadow_of(const mesh::GarmentMesh& g, const Eigen::Vector2d& centre) {
+  constexpr double pixel = 5e-4;
+  constexpr int size = 720;  // 360 mm
+  std::vector<char> dark(static_cast<std::size_t>(size) * size, 0);
+  const auto to_pixel = [&](double v, double c) { return (v - c) / pixel + 0.5 * size; };
+  for (Eigen::Index f = 0; f < g.face_count(); ++f) {
+    std::array<Eigen::Vector2d, 3> p;
+    for (int k = 0; k < 3; ++k) p[static_cast<std::size_t>(k)] = {to_pixel(g.x(g.faces(f, k), 0), centre.x()), to_pixel(g.x(g.faces(f, k), 1), centre.y())};
+    const Eigen::Vector2d low = p[0].cwiseMin(p[1]).cwiseMin(p[2]), high = p[0].cwiseMax(p[1]).cwiseMax(p[2]);
+    for (int y = std::max(0, static_cast<int>(low.y())); y <= std::min(size - 1, static_cast<int>(high.y())); ++y) {
+      for (int x = std::max(0, static_cast<int>(low.x())); x <= std::min(size - 1, static_cast<int>(high.x())); ++x) {
+        const Eigen::Vector2d q(x + 0.5, y + 0.5);
+        int left = 0, right = 0;
+        for (std::size_t k = 0; k < 3; ++k) {
+          const Eigen::Vector2d d = p[(k + 1) % 3] - p[k], w = q - p[k];
+          const double side = d.x() * w.y() - d.y() * w.x();
+          left += side >= 0;
+          right += side <= 0;
+        }
+        if (left == 3 || right == 3) dark[static_cast<std::size_t>(y) * size + static_cast<std::size_t>(x)] = 1;
+      }
+    }
+  }
+  Shadow shadow;
+  shadow.area = pixel * pixel * static_cast<double>(std::count(dark.begin(), dark.end(), 1));
+  // Rim: farthest dark pixel by direction, smoothed; waves that rise by more than 2 mm.
+  constexpr int directions = 360;
+  std::vector<double> radius(directions, 0);
+  for (int y = 0; y < size; ++y) {
+    for (int x = 0; x < size; ++x) {
+      if (!dark[static_cast<std::size_t>(y) * size + static_cast<std::size_t>(x)]) continue;
+      const double dx = x + 0.5 - 0.5 * size, dy = y + 0.5 - 0.5 * size;
+      const int d = std::min(directions - 1, static_cast<int>((std::atan2(dy, dx) + pi) / (2 * pi) * directions));
+      radius[static_cast<std::size_t>(d)] = std::max(radius[static_cast<std::size_t>(d)], pixel * std::hypot(dx, dy));
+    }
+  }
+  // Turning points with hysteresis, once round and a bit more.
+  double extreme = radius[0];
+  bool rising = true;
+  int start = -1;
+  for (int k = 0; k < 3 * directions; ++k) {
+    const double r = radius[static_cast<std::size_t>(k % directions)];
+    if (rising ? r > extreme : r < extreme) extreme = r;
+    if (std::abs(r - extreme) <= 2e-3 || (r > extreme) == rising) continue;
+    if (rising) {
+      // A crest has been passed.
+      if (start < 0 && k >= directions) start = k;
+      if (start >= 0 && k < start + directions) ++shadow.nodes;
+    }
+    rising = !rising;
+    extreme = r;
+  }
+  return shadow;
+}
+
+Experiment drape(const Scope& scope) {
+  Experiment e{.test = "drape", .title = "Cusick drape", .about =
+               "A circle of 300 mm, held flat on a disc of 180 mm ([Cusick 1968](bibliography.md#cusick1968)); drape coefficient = (shadow − disc)/(specimen − disc) in per cent, shadow of the result by half millimetres, and its nodes. The "
+               "suiting, elastic. Placements turn the cloth on the disc by 0, 15 and 30°, which gives other grids on the same circle. There is no public complete set of KES-F data with drape of the same bolt, so no row claims a measured fabric; what counts here is what the coefficient owes to mesh, stopping rule, path and placement: less than a point. "
+               "Contact of the cloth with the disc's rim from below is left out."};
+  struct Key {
+    std::string subject, mesh;
+    Model model;
+    double cell, turn, residual, step;
+    Net net;
+  };
+  std::vector<Key> keys;
+  if (!scope.quick) {
+    for (const Model model : models(scope)) {
+      keys.push_back({"reference: cells of 7.5 mm", "grid", model, 0.0075, 0, 1e-3, 1 / 60.0, Net::grid});
+      keys.push_back({"cells of 5 mm", "grid", model, 0.005, 0, 1e-3, 1 / 60.0, Net::grid});
+      if (model == Model::particle) continue;
+      keys.push_back({"Delaunay", "Delaunay", model, 0.0075, 0, 1e-3, 1 / 60.0, Net::delaunay});
+      keys.push_back({"jittered", "jittered", model, 0.0075, 0, 1e-3, 1 / 60.0, Net::jittered});
+      keys.push_back({"residual 10⁻⁴", "grid", model, 0.0075, 0, 1e-4, 1 / 60.0, Net::grid});
+      keys.push_back({"first step twice as long", "grid", model, 0.0075, 0, 1e-3, 1 / 30.0, Net::grid});
+      keys.push_back({"turned by 15°", "grid", model, 0.0075, 15, 1e-3, 1 / 60.0, Net::grid});
+      keys.push_back({"turned by 30°", "grid", model, 0.0075, 30, 1e-3, 1 / 60.0, Net::grid});
+    }
+  }
+  for (const Key& k : keys) {
+    const double c = 10 * std::cos(k.turn * pi / 180), s = 10 * std::sin(k.turn * pi / 180);
+    std::string pattern = fmt::format("name: specimen\nunits: mm\ny: up\npieces:\n  specimen:\n    cut: 1\n    grain: [[0, 0], [{}, {}]]\n    points: {{a: [-150, 0], b: [150, 0]}}\n    outline:\n      - {{name: low, path: [a, {{arc: {{through: [0, -150]}}}}, b]}}\n"
+                                      "      - {{name: high, path: [b, {{arc: {{through: [0, 150]}}}}, a]}}\n    lines:\n      disc: {{kind: other, path: [[-90, 0], {{arc: {{through: [0, -90]}}}}, [90, 0], {{arc: {{through: [0, 90]}}}}, [-90, 0]]}}\n",
+                                      format_number(c), format_number(s));
+    // Panel coordinates are those of the pattern turned until the grain is upright; the disc is a polygon a little outside of its line.
+    std::string region;
+    for (int i = 0; i < 72; ++i) region += fmt::format("{}[{} m, {} m]", i ? ", " : "", format_number(0.0901 * std::cos(i * pi / 36)), format_number(0.0901 * std::sin(i * pi / 36)));
+    std::string spec = fmt::format("model: {}\nresidual: {}\ntime_step: {} s\nmax_iterations: 3000\ngravity_direction: [0, 0, -1]\nwatch: [specimen.disc]\nrecord: record.csv\nconstraints:\n  - {{name: disc, on: [specimen], kind: pin, region: [{}]}}\n",
+                                   name_of(k.model), format_number(k.residual), format_number(k.step), region);
+    Case one{fmt::format("{}_{}", name_of(k.model), &k - keys.data()), {{"pattern.yaml", pattern}, {"cloth.yaml", fabric_yaml(suiting())}, {"simulation.yaml", spec}}, {}};
+    std::vector<std::string> cut{"pattern.yaml", "-o", "panels.ply", "--cell", format_number(1e3 * k.cell) + " mm", "--lines", "['*.disc']"};
+    if (k.net == Net::delaunay) cut.insert(cut.end(), {"--mesher", "delaunay"});
+    if (k.net == Net::jittered) cut.insert(cut.end(), {"--jitter", "0.25"});
+    one.steps = {{"toile-mesh", cut, {}}, {"toile-layer", {"panels.ply", "--fabrics", "cloth.yaml", "--base", "cloth", "-o", "layered.ply"}, {}}, {"toile-simulate", {"layered.ply", "-o", "result.ply", "--spec", "simulation.yaml"}, {}}};
+    e.cases.push_back(one);
+  }
+  e.wants_garments = true;
+  e.judge = [=](const std::vector<Outcome>& outcomes) {
+    Section section;
+    std::optional<double> reference;
+    const double disc = pi * 0.09 * 0.09, specimen = pi * 0.15 * 0.15;
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+      const Key& k = keys[i];
+      Row row = row_of("drape", k.subject, k.model, k.mesh, "drape coefficient", "%", outcomes[i]);
+      row.measure = Measure::absolute;
+      row.target = 1;
+      const bool first = i == 0 || keys[i - 1].model != k.model;
+      if (first) reference.reset();
+      if (outcomes[i].ran && row_count(outcomes[i].record) > 0) {
+        const Eigen::Vector3d centre = watched(outcomes[i].record, "specimen.disc", row_count(outcomes[i].record) - 1);
+        const Shadow shadow = shadow_of(outcomes[i].garment, centre.head<2>());
+        row.value = 100 * (shadow.area - disc) / (specimen - disc);
+        row.note = fmt::format("{} nodes", shadow.nodes);
+        if (first) reference = row.value;
+      }
+      row.reference = reference;
+      if (first) row.note += row.note.empty() ? "the others are compared with it" : "; the others are compared with it";
+      section.rows.push_back(row);
+    }
+    return section;
+  };
+  return e;
+}
+
+}  // namespace
+
+std::vector<Experiment> shape_tests(const Scope& scope) { return {buckling(scope), friction_cantilever(scope), incline(scope), drape(scope)}; }
+
+}  // namespace toile::lab
