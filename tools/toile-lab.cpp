@@ -215,6 +215,7 @@ struct LabStage {
     scope.woven = params.model != Models::particle;
     scope.particle = params.model != Models::woven;
     scope.internal_friction = simulator_has("internal_friction", work);
+    scope.newton_accuracy = simulator_has("newton_accuracy", work);
     const std::vector<lab::Experiment> experiments = lab::experiments(scope, only);
     struct Job {
       std::size_t experiment, index;

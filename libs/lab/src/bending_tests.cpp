@@ -3,6 +3,7 @@
 
 #include <Eigen/Dense>
 #include <cmath>
+#include <map>
 #include <numbers>
 
 #include "bench_setup.h"
@@ -147,16 +148,20 @@ Experiment cantilevers(const Scope& scope) {
     std::vector<Row> group;
     Plot plot{.name = "cantilever", .title = "Cantilever, warp along the strip", .x_label = "w L³/B", .y_label = "drop over reach", .log_x = true, .log_y = true, .curves = {}};
     Curve curve{.name = "heavy elastica", .x = {}, .y = {}, .reference = true};
-    for (int i = 0; i <= 60; ++i) {
-      curve.x.push_back(std::pow(10, -1 + 4 * i / 60.0));
+    for (int i = 0; i <= 40; ++i) {
+      curve.x.push_back(std::pow(10, -1 + 4 * i / 40.0));
       const Cantilever c = cantilever(curve.x.back());
       curve.y.push_back(c.drop / c.reach);
     }
     plot.curves.push_back(curve);
+    std::map<double, Cantilever> exact_of;
+    for (const Key& k : keys) {
+      if (!exact_of.count(k.c.gamma)) exact_of[k.c.gamma] = cantilever(k.c.gamma);
+    }
     for (std::size_t i = 0; i < keys.size(); ++i) {
       const Key& k = keys[i];
       const Strip& strip = k.c.strip;
-      const Cantilever exact = cantilever(k.c.gamma);
+      const Cantilever exact = exact_of.at(k.c.gamma);
       Row row = row_of("cantilever", fmt::format("Γ = {}, warp at {}°", format_number(k.c.gamma), strip.warp), k.model, name_of(strip.net), "drop over reach", "1", outcomes[i]);
       row.reference = exact.drop / exact.reach;
       row.target = k.c.gamma <= 100 && k.cells >= 64 ? 0.003 : 0.01;
@@ -244,7 +249,7 @@ Experiment kes_bending(const Scope& scope) {
       b.reference = warp == 0 ? cloth.b_warp : cloth.b_weft;
       loop.reference = warp == 0 ? cloth.hb_warp : cloth.hb_weft;
       b.target = 0.01;
-      loop.target = 0.03;
+      loop.target = 0.01;
       if (outcomes[i].ran) {
         const Eigen::Vector3d axis = along(strip).cross(Eigen::Vector3d::UnitZ());
         std::vector<double> moment = component(outcomes[i].record, "jaw", "moment", "Nm", axis);

@@ -128,7 +128,7 @@ Experiment catenaries(const Scope& scope) {
 
 Experiment kes_tension(const Scope& scope) {
   Experiment e{.test = "kes_tension", .title = "KES-F tension",
-               .about = "200 mm of the suiting between jaws 50 mm apart, pulled to its EMT and back in steps of a twenty-fifth. EMT is the strain at 500 gf/cm, WT the work to there, LT = 2 WT/(F EMT), RT the part of WT that comes back "
+               .about = "200 mm of the suiting between jaws 50 mm apart, pulled to its EMT and back in steps of a fiftieth. EMT is the strain at 500 gf/cm, WT the work to there, LT = 2 WT/(F EMT), RT the part of WT that comes back "
                         "([Kawabata 1980](bibliography.md#kawabata1980)). The reference is the card. `particle` is linear: LT = 1."};
   struct Key {
     Strip strip;
@@ -136,7 +136,7 @@ Experiment kes_tension(const Scope& scope) {
   };
   std::vector<Key> keys;
   const Cloth cloth = suiting();
-  const int steps = 25;
+  const int steps = 50;
   for (const Model model : models(scope)) {
     for (const double warp : {0.0, 90.0}) {
       for (const Net net : {Net::grid, Net::jittered}) {
@@ -173,7 +173,7 @@ Experiment kes_tension(const Scope& scope) {
         row.target = target;
         return row;
       };
-      Row extension = make("EMT", "1", emt, 0.01), work = make("WT", "J/m2", 0.5 * lt * cloth.force_max * emt, 0.03), linearity = make("LT", "1", lt, 0.01), resilience = make("RT", "1", rt, 0.01);
+      Row extension = make("EMT", "1", emt, 0.01), work = make("WT", "J/m2", 0.5 * lt * cloth.force_max * emt, 0.03), linearity = make("LT", "1", lt, 0.01), resilience = make("RT", "1", rt, 0.03);
       if (outcomes[i].ran) {
         std::vector<double> force = component(outcomes[i].record, "jaw", "force", "N", along(strip)), strain = component(outcomes[i].record, "jaw", "move", "m", along(strip));
         std::vector<double> f{0}, s{0};
@@ -248,7 +248,7 @@ Experiment kes_shear(const Scope& scope) {
         row.target = target;
         return row;
       };
-      Row g = make("G", "N/m", cloth.g, 0.01), loop = make("2HG", "N/m", cloth.hg, 0.03), loop5 = make("2HG5", "N/m", cloth.hg5, 0.03);
+      Row g = make("G", "N/m", cloth.g, 0.01), loop = make("2HG", "N/m", cloth.hg, 0.01), loop5 = make("2HG5", "N/m", cloth.hg5, 0.01);
       if (outcomes[i].ran) {
         const std::vector<double> side = component(outcomes[i].record, "jaw", "force", "N", across(strip)), pull = component(outcomes[i].record, "jaw", "force", "N", along(strip));
         std::vector<double> f{0};

@@ -84,7 +84,7 @@ Cantilever cantilever(double gamma, double eta) {
   TOILE_CHECK(gamma > 0 && gamma <= 5000 && eta >= 0, "gamma {}, eta {}", gamma, eta);
   // Half of gamma is the moment at the clamp of a straight strip: below eta nothing bends.
   if (0.5 * gamma <= eta) return {0, 1};
-  constexpr int steps = 8000;
+  constexpr int steps = 2000;
   // The angle at the free end, as a logarithm since it becomes exp(-sqrt(gamma)) small.
   const double start = root(std::log(0.5 * pi) - 3 * std::sqrt(gamma) - 1, std::log(0.5 * pi), [&](double x) { return fall(gamma, eta, std::exp(x), steps)[0] - 0.5 * pi; });
   const State end = fall(gamma, eta, std::exp(start), steps);
@@ -225,7 +225,8 @@ std::vector<StickPoint> stick_slip(double gamma) {
   };
   std::vector<StickPoint> curve;
   double push = 4.493409457909064 * 4.493409457909064 + 0.5 * gamma, side = 0;
-  for (double k = 0.02; k < 12; k += k < 0.2 ? 0.02 : 0.05) {
+  double before_push = push, before_side = side, step_size = 0.02;
+  for (double k = 0.02; k < 12; k += step_size) {
     if (curve.empty()) side = -k;
     for (int i = 0; i < 30; ++i) {
       const End e = shoot(k, push, side);
@@ -240,8 +241,19 @@ std::vector<StickPoint> stick_slip(double gamma) {
     }
     const End e = shoot(k, push, side);
     if (!std::isfinite(push) || std::abs(e.x) > 1e-6 || std::abs(e.slope) > 1e-5) break;
+    if (std::abs(e.theta) >= 0.5 * pi) {
+      // Flat on the plane: from there on it touches along a line. Up to that angle in smaller steps.
+      if (step_size < 1e-4) break;
+      k -= step_size;
+      step_size *= 0.25;
+      push = before_push;
+      side = before_side;
+      continue;
+    }
     curve.push_back({1 - e.height, std::abs(side) / push, push});
-    if (std::abs(e.theta) >= 0.5 * pi) break;
+    before_push = push;
+    before_side = side;
+    if (k > 0.2 && step_size == 0.02) step_size = 0.05;
   }
   return curve;
 }
