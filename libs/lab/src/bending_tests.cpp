@@ -225,7 +225,7 @@ Experiment kes_bending(const Scope& scope) {
           turns.push_back(angle);
         }
         const Eigen::Vector3d axis = along(strip).cross(Eigen::Vector3d::UnitZ());
-        std::string spec = common(Model::woven, 1e-4, 1000) + (scope.internal_friction ? "internal_friction: true\n" : "") + fmt::format("gravity: 0\nincrements: {}\nduration: {} s\nconstraints:\n  - {{name: fixed, on: [strip.clamp], kind: clamp}}\n", curvature.size() - 1, curvature.size() - 1);
+        std::string spec = common(Model::woven, 1e-4, 1000) + (scope.internal_friction ? "internal_friction: yes\n" : "") + fmt::format("gravity: 0\nincrements: {}\nduration: {} s\nconstraints:\n  - {{name: fixed, on: [strip.clamp], kind: clamp}}\n", curvature.size() - 1, curvature.size() - 1);
         spec += path_yaml("jaw", "[strip.tip]", "clamp", moves, turns, axis, place(strip, gauge, 0.5 * strip.width));
         keys.push_back({warp, net});
         e.cases.push_back(strip_case(fmt::format("woven_{}_{}", strip.file_name(), warp), strip, suiting(), spec));

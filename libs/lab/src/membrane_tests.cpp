@@ -19,7 +19,7 @@ std::string common(Model model, double residual, int iterations) {
   return fmt::format("model: {}\nself_reach: 0.1 mm\nresidual: {}\nmax_iterations: {}\nrecord: record.csv\n", name_of(model), format_number(residual), iterations);
 }
 
-std::string sliders(const Scope& scope, Model model) { return scope.internal_friction && model == Model::woven ? "internal_friction: true\n" : ""; }
+std::string sliders(const Scope& scope, Model model) { return scope.internal_friction && model == Model::woven ? "internal_friction: yes\n" : ""; }
 
 std::string increments(std::size_t count) { return fmt::format("increments: {}\nduration: {} s\n", count, count); }
 

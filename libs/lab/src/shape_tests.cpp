@@ -94,7 +94,7 @@ Experiment friction_cantilever(const Scope& scope) {
       cloth.weight = gamma * cloth.b_warp / (earth * std::pow(strip.length, 3));
       cloth.hb_warp = cloth.hb_weft = 2 * eta * cloth.b_warp / strip.length;
       std::string spec = common(Model::woven, 1e-4, 3000) + "gravity_direction: [0, 0, -1]\ngravity_times: [0 s, 10 s]\ngravity_factor: [0, 1]\nincrements: 10\nduration: 10 s\nwatch: [strip.tip, strip.clamp]\n" +
-                         (scope.internal_friction ? "internal_friction: true\n" : "") + "constraints:\n  - {name: clamp, on: [strip.clamp], kind: clamp}\n";
+                         (scope.internal_friction ? "internal_friction: yes\n" : "") + "constraints:\n  - {name: clamp, on: [strip.clamp], kind: clamp}\n";
       e.cases.push_back(strip_case(fmt::format("woven_gamma{}_eta{}", gamma, eta), strip, cloth, spec));
       keys.push_back({gamma, eta});
     }
