@@ -14,7 +14,7 @@ struct SimulateStage {
 
   static stage::Description description() {
     return {.name = "toile-simulate",
-            .version = 9,
+            .version = 10,
             .summary = "Lets a placed garment hang to rest on a body, or move in time.",
             .example = "toile-simulate placed.ply --support form.ply -o draped.ply",
             .details = "Open seams are drawn together first; then the garment relaxes until the sum of all net forces is a given part of its "
@@ -63,7 +63,12 @@ struct SimulateStage {
     run.report("penetrating_vertices", report.inside);
     run.report("start_inside", report.start_inside);
     run.report("start_intersections", report.start_intersections);
+    run.report("start_intersections_left", report.start_left);
     run.report("start_move", report.start_move, "m");
+    for (const dynamics::Untangling& u : report.untangled) {
+      run.report(fmt::format("untangled_{}", u.panel), u.moved);
+      run.report(fmt::format("untangle_move_{}", u.panel), u.largest_move, "m");
+    }
     run.report("membrane_energy", report.membrane_energy, "J");
     run.report("bending_energy", report.bending_energy, "J");
     run.report("potential_energy", report.potential_energy, "J");

@@ -426,6 +426,55 @@ TEST(Simulate, ClothInsideTheSupportIsPushedOutAndReported) {
   expect_clean(*result, ball());
 }
 
+/// A square of cloth lies flat, the corner of another one pokes through it by `depth` [m].
+GarmentMesh poked(double depth) {
+  GarmentMesh g;
+  fixtures::add_fabric(g, shirting());
+  fixtures::add_grid_panel(g, "flat", 12, 12, 0.12, 0.12, [](double u, double v) { return Eigen::Vector3d(u - 0.06, 0, 0.06 - v); });
+  fixtures::add_grid_panel(g, "corner", 10, 10, 0.1, 0.1, [&](double u, double v) { return Eigen::Vector3d(0.0013 + 0.5 * (u - v), 0.70 * (u + v) - depth, 0.0031 + 0.5 * (u + v)); });
+  return g;
+}
+
+TEST(Simulate, StartThatCutsThroughItselfIsUntangledAndReported) {
+  SimulationParams params;
+  params.mode = Mode::motion;
+  params.duration = 0.1;
+  const auto result = simulate(poked(0.008), std::nullopt, params);
+  ASSERT_TRUE(result);
+  const SimulationReport& r = result->report;
+  EXPECT_GT(r.start_intersections, 0);
+  EXPECT_EQ(r.start_left, 0);
+  EXPECT_EQ(r.intersections, 0);
+  EXPECT_TRUE(result->findings.empty()) << to_string(result->findings.front());
+  EXPECT_GT(r.start_move, 0.003);
+  EXPECT_LT(r.start_move, 0.03);
+  ASSERT_FALSE(r.untangled.empty());
+  for (const Untangling& u : r.untangled) {
+    EXPECT_TRUE(u.panel == "flat" || u.panel == "corner");
+    EXPECT_GT(u.moved, 0);
+    EXPECT_LE(u.largest_move, r.start_move);
+  }
+}
+
+TEST(Simulate, WhatCannotBeUntangledIsNamed) {
+  SimulationParams params;
+  params.mode = Mode::motion;
+  params.duration = 0.02;
+  // All that could move is held.
+  params.fixed = {"corner.bottom", "corner.left", "corner.right", "corner.top"};
+  ConstraintSpec all;
+  all.name = "all";
+  all.on = {"flat", "corner"};
+  params.constraints = {all};
+  const auto result = simulate(poked(0.008), std::nullopt, params);
+  ASSERT_TRUE(result);
+  EXPECT_GT(result->report.start_left, 0);
+  EXPECT_GT(result->report.intersections, 0);
+  ASSERT_FALSE(result->findings.empty());
+  EXPECT_EQ(result->findings.front().code, "self_intersection");
+  EXPECT_EQ(result->findings.front().category, Category::check);
+}
+
 TEST(Simulate, BadInputIsRefused) {
   GarmentMesh g = napkin();
   g.face_laminate[3] = -1;

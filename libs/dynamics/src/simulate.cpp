@@ -4,6 +4,7 @@
 #include "toile/contact/exact.h"
 #include "toile/contact/search.h"
 #include "toile/contact/support_field.h"
+#include "toile/contact/untangle.h"
 #include "toile/dynamics/air.h"
 #include "toile/dynamics/constraints.h"
 #include "toile/dynamics/contact_force.h"
@@ -18,6 +19,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <set>
 
 namespace toile::dynamics {
@@ -469,31 +471,77 @@ Issues Run::find_constraints() {
   return issues;
 }
 
+/// Takes the start out of the support and out of itself, as far as that goes. What stays is left out of the limiter.
 void Run::clear_start() {
   phase("check");
-  if (support_) {
-    const contact::SupportField field(support_surface_, support_x_);
-    const double clearance = 0.25 * params_.support_reach;
-    const contact::PushedOut pushed = contact::project_outside(field, search_->cloth(), x_, clearance);
-    report_.start_inside = pushed.inside_before;
-    report_.start_move = pushed.largest_move;
+  const contact::Surface& cloth = search_->cloth();
+  const Points3 given = x_;
+  std::optional<contact::SupportField> field;
+  if (support_) field.emplace(support_surface_, support_x_);
+  const double clearance = 0.25 * params_.support_reach;
+  const auto push_out = [&] {
+    if (!field) return false;
+    const contact::PushedOut pushed = contact::project_outside(*field, cloth, x_, clearance);
+    report_.start_inside = std::max(report_.start_inside, pushed.inside_before);
     if (pushed.moved > 0) x_ = pushed.x;
+    return pushed.moved > 0;
+  };
+  push_out();
+  contact::UntangleOptions options;
+  options.held.assign(static_cast<std::size_t>(sheet_.node_count), 0);
+  for (std::size_t i = 0; i < options.held.size(); ++i) options.held[i] = holder_[i] >= 0;
+  std::vector<contact::FacePair> cuts = contact::self_intersections(cloth, x_);
+  report_.start_intersections = static_cast<int>(cuts.size());
+  // Out of itself may be into the support, and back.
+  Points3 best = x_;
+  std::size_t fewest = cuts.size();
+  for (int round = 0; round < 3 && !cuts.empty(); ++round) {
+    x_ = contact::untangle(cloth, x_, options).x;
+    const bool pushed = push_out();
+    cuts = contact::self_intersections(cloth, x_);
+    if (cuts.size() < fewest) {
+      fewest = cuts.size();
+      best = x_;
+    } else if (!pushed) {
+      break;
+    }
+  }
+  if (cuts.size() > fewest) {
+    x_ = best;
+    cuts = contact::self_intersections(cloth, x_);
   }
   const auto mark = [&](int face, std::vector<std::uint8_t>& exempt) {
     exempt.resize(static_cast<std::size_t>(sheet_.node_count), 0);
     for (int node : sheet_.corners[static_cast<std::size_t>(face)]) exempt[static_cast<std::size_t>(node)] = 1;
   };
-  for (const contact::FacePair& pair : contact::self_intersections(search_->cloth(), x_)) {
-    ++report_.start_intersections;
+  for (const contact::FacePair& pair : cuts) {
     mark(pair.a, self_exempt_);
     mark(pair.b, self_exempt_);
   }
+  report_.start_left = static_cast<int>(cuts.size());
   if (support_) {
-    for (const contact::FacePair& pair : contact::support_intersections(search_->cloth(), x_, support_surface_, support_x_)) {
+    for (const contact::FacePair& pair : contact::support_intersections(cloth, x_, support_surface_, support_x_)) {
       ++report_.start_intersections;
+      ++report_.start_left;
       mark(pair.a, support_exempt_);
     }
   }
+  // What moved how far, panel by panel.
+  std::map<int, Untangling> moved;
+  std::vector<char> counted(static_cast<std::size_t>(sheet_.node_count), 0);
+  for (Eigen::Index v = 0; v < sheet_.node_of_vertex.size(); ++v) {
+    const int node = sheet_.node_of_vertex[v];
+    const double way = (x_.row(node) - given.row(node)).norm();
+    report_.start_move = std::max(report_.start_move, way);
+    if (!(way > 0) || report_.start_intersections == 0 || counted[static_cast<std::size_t>(node)]) continue;
+    counted[static_cast<std::size_t>(node)] = 1;
+    const int panel = garment_.vertex_panel[v];
+    Untangling& entry = moved[panel];
+    entry.panel = garment_.panels[static_cast<std::size_t>(panel)].name;
+    ++entry.moved;
+    entry.largest_move = std::max(entry.largest_move, way);
+  }
+  for (const auto& [panel, entry] : moved) report_.untangled.push_back(entry);
   start_ = x_;
 }
 
@@ -643,8 +691,8 @@ bool Run::iterate() {
   };
   const double before = energy_ + inertia_energy(x_), scale_of_slack = force_scale();
   phase("solve");
-  solver_.factor(response_.matrix, terms_, x_, fixed_);
   const bool in_time = params_.mode == Mode::motion && inertia_rate_[0] > 0 && sheet_.links.empty();
+  solver_.factor(response_.matrix, terms_, x_, fixed_);
   if (in_time) {
     // What inertia alone would do is the first guess.
     direction_.resize(n);
@@ -992,7 +1040,7 @@ void Run::move_in_time() {
   const int steps = std::max(1, static_cast<int>(std::lround(params_.duration / params_.time_step)));
   // What touches at the start sticks from the start.
   start_ = x_;
-  evaluate(x_, false);
+  evaluate(x_, true);
   friction_ = update_friction(friction_, start_, contacts_, x_, support_x_, sheet_.area, laws_);
   const double h = step_;
   const auto nodes = static_cast<std::size_t>(sheet_.node_count);
@@ -1032,7 +1080,12 @@ void Run::move_in_time() {
     inertia_rate_ = velocity_rate_.cwiseAbs2();
     find_resistance(before, velocity_before, i == 0);
     damped_ = true;
-    evaluate(x_, true);
+    // The sheet has been evaluated here at the end of the last step, but friction between yarns has gone on since, and damping is to be added.
+    if (params_.internal_friction == YarnFriction::yes || params_.damping_stiffness > 0) {
+      evaluate(x_, true);
+    } else {
+      add_forces(x_, true);
+    }
     bool done = false;
     for (int k = 0; k < params_.newton_iterations && !done; ++k) {
       const bool moved = iterate();

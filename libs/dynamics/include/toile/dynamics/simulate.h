@@ -153,6 +153,13 @@ struct Reaction {
   Eigen::Vector3d moment = Eigen::Vector3d::Zero();  ///< about the mean of its particles [N m]
 };
 
+/// What untangling the start moved of a panel.
+struct Untangling {
+  std::string panel;
+  int moved = 0;            ///< particles
+  double largest_move = 0;  ///< [m]
+};
+
 /// How the caller follows a run; any may be empty.
 struct SimulationHooks {
   std::function<void(double fraction, const std::string& text)> progress;
@@ -176,6 +183,8 @@ struct SimulationReport {
   std::vector<Reaction> reactions;
   std::vector<std::pair<std::string, double>> distance_forces;  ///< of held distances at the end; positive: pushes the two apart [N]
   int start_inside = 0, start_intersections = 0;
+  int start_left = 0;             ///< intersections of the start that could not be undone
+  std::vector<Untangling> untangled;  ///< panels that untangling the start moved
   double start_move = 0;          ///< farthest that a particle was pushed out of the support at the start [m]
   int intersections = 0, support_intersections = 0, inside = 0;  ///< at the end, by the exact test
 };
