@@ -451,4 +451,11 @@ Points3 CoarseGarment::restricted(const Points3& fine) const {
   return coarse;
 }
 
+std::vector<double> CoarseGarment::restricted(const std::vector<double>& fine) const {
+  std::vector<double> coarse;
+  if (fine.empty()) return coarse;
+  for (const int v : fine_of) coarse.push_back(fine[static_cast<std::size_t>(v)]);
+  return coarse;
+}
+
 }  // namespace toile::placement

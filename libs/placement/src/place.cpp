@@ -9,6 +9,7 @@
 #include "toile/placement/attach.h"
 #include "toile/placement/coarse.h"
 #include "toile/placement/developable.h"
+#include "toile/placement/layers.h"
 #include "toile/placement/mirror.h"
 #include "toile/placement/relax.h"
 #include "toile/placement/subset.h"
@@ -37,6 +38,13 @@ constexpr double kLevel = 3;              // of edge lengths from one mesh to th
 constexpr double kRound = 0.005;          // sections of a cone leave their circle, and circles their cone, by this part of the radius at most
 constexpr double kUpright = 0.001;        // a cone's slope under which it is a cylinder
 constexpr double kNearly = 1e-4;           // cloth that is so much too near to a region stays as it is rolled [m]
+constexpr double kLayerGap = 1.5;         // of free layers from what they lie on at the start, over the thickness
+constexpr double kLayerOffset = 0.5;      // layers come as near to the support as this part of the offset
+constexpr int kLayerSettling = 2;         // of the steps of a fine mesh
+constexpr int kLayerPolishing = 20;       // steps before the panels under them move too
+constexpr double kLayerSeam = 0.1;        // of the pull of other seams: those of linings that hang lower than their hem stay open
+constexpr double kLayerClosed = 0.005;    // seams of layers that start closed [m]
+constexpr double kShellShare = 0.7;       // of the work
 constexpr double kSheet = 0.004;           // between sheets that lie on one another at the start [m]
 
 double polygon_perimeter(const Points2& p) {
@@ -302,6 +310,7 @@ struct Level {
   const mesh::GarmentMesh* mesh;
   FoldedFlat flat;
   Points3 bent;
+  Rooms room;
 };
 
 }  // namespace
@@ -723,15 +732,15 @@ Result<Placed> place_on_frame(const mesh::GarmentMesh& garment, const mesh::Supp
   return placed;
 }
 
-Result<Placed> place_as_given(const mesh::GarmentMesh& sewn, const mesh::SupportMesh& support, const PlaceParams& params, const std::function<void(double)>& progress) {
-  if (!sewn.free_layers.empty()) {
-    Issues issues;
-    for (const mesh::FreeLayer& layer : sewn.free_layers) {
-      issues.push_back({.code = "free_layer", .place = {.item = "free layer " + layer.name}, .what = "layers with a grid of their own (" + names_of(sewn, layer.panels) + ") cannot be placed",
-                        .remedy = "place the garment without these panels (toile-layer without `free`, toile-mesh with `leave_out`)"});
-    }
-    return issues;
-  }
+// A garment without free layers, laid on the support.
+struct Laid {
+  Points3 x;
+  std::vector<std::optional<WantedDirection>> wanted;
+  std::vector<PartFit> fits;
+  Issues warnings;
+};
+
+Result<Laid> lay_shell(const mesh::GarmentMesh& sewn, const Rooms& rooms, const mesh::SupportMesh& support, const PlaceParams& params, const std::function<void(double)>& progress) {
   const std::vector<int> stuck = stuck_folds(sewn);
   const mesh::GarmentMesh garment = without_folds(sewn, stuck);
   TOILE_TRY(RelaxOptions options, relax_options(support, params));
@@ -753,10 +762,11 @@ Result<Placed> place_as_given(const mesh::GarmentMesh& sewn, const mesh::Support
     options.sides.x = frame.x_mid;
     options.sides.below = frame.crotch;
   }
-  Placed placed;
-  placed.garment = sewn;
+  options.room_inside = rooms.inside;
+  options.room_outside = rooms.outside;
+  Laid laid;
   for (int fold : stuck) {
-    placed.warnings.push_back({.code = "fold_not_turned", .place = {.item = "fold " + sewn.folds[static_cast<std::size_t>(fold)].name},
+    laid.warnings.push_back({.code = "fold_not_turned", .place = {.item = "fold " + sewn.folds[static_cast<std::size_t>(fold)].name},
                                .what = "its line curves round the part that turns: without stretching the cloth it cannot be folded back; it is placed flat",
                                .remedy = "the simulation turns it, or straighten the line"});
   }
@@ -773,17 +783,23 @@ Result<Placed> place_as_given(const mesh::GarmentMesh& sewn, const mesh::Support
   const bool shaped = std::any_of(layout.panels.begin(), layout.panels.end(), [](const PanelLayout& p) { return p.part == Part::attached; }) ||
                       !fold_lines(garment).empty() || garment.welds.empty();
   const auto rolled_of = [&](const Points3& x) { return shaped ? x : Points3(); };
-  const auto assemble = [&](const mesh::GarmentMesh& mesh, const FoldedFlat& flat, const Points3& bent) {
+  const auto assemble = [&](const mesh::GarmentMesh& mesh, const FoldedFlat& flat, const Points3& bent, const Rooms& room) {
     RelaxOptions stage = options;
     stage.rolled = rolled_of(bent);
+    stage.room_inside = room.inside;
+    stage.room_outside = room.outside;
     if (std::find(first.begin(), first.end(), 0) == first.end()) return relax(mesh, bent, support, stage);
     const Subset tubes = take(mesh, first);
     stage.rolled = rolled_of(tubes.restricted(bent));
+    stage.room_inside = tubes.restricted(room.inside);
+    stage.room_outside = tubes.restricted(room.outside);
     stage.settling_steps = stage.polishing_steps = 0;
     Points3 x = tubes.merged(relax(tubes.mesh, tubes.restricted(bent), support, stage), bent);
     x = attach(mesh, flat, layout, x, support, params.offset);
     stage = options;
     stage.rolled = rolled_of(x);
+    stage.room_inside = room.inside;
+    stage.room_outside = room.outside;
     stage.flattening.depth = 1;
     stage.swelling_steps = 0;
     return relax(mesh, x, support, stage);
@@ -802,13 +818,13 @@ Result<Placed> place_as_given(const mesh::GarmentMesh& sewn, const mesh::Support
   if (params.coarse > 1.25 * cell) sizes.push_back(params.coarse);
   const double levels = static_cast<double>(sizes.size()) + 1;
   std::vector<CoarseGarment> coarse;
-  std::vector<Level> meshes{{&garment, folded_flat, start.x}};
+  std::vector<Level> meshes{{&garment, folded_flat, start.x, rooms}};
   coarse.reserve(sizes.size());
   for (const double size : sizes) {
     const Level& finer = meshes.back();
     coarse.push_back(coarsen(*finer.mesh, size));
     const CoarseGarment& made = coarse.back();
-    Level level{&made.mesh, {}, made.restricted(finer.bent)};
+    Level level{&made.mesh, {}, made.restricted(finer.bent), {made.restricted(finer.room.inside), made.restricted(finer.room.outside)}};
     level.flat.uv.resize(static_cast<Eigen::Index>(made.fine_of.size()), 2);
     for (std::size_t i = 0; i < made.fine_of.size(); ++i) {
       level.flat.uv.row(static_cast<Eigen::Index>(i)) = finer.flat.uv.row(made.fine_of[i]);
@@ -821,7 +837,7 @@ Result<Placed> place_as_given(const mesh::GarmentMesh& sewn, const mesh::Support
     if (progress) progress((done + f) / (levels + 1));
   };
   const bool stays = rolled_is_clear();
-  Points3 x = stays ? start.x : assemble(*meshes.back().mesh, meshes.back().flat, meshes.back().bent);
+  Points3 x = stays ? start.x : assemble(*meshes.back().mesh, meshes.back().flat, meshes.back().bent, meshes.back().room);
   options.flattening.depth = 1;
   options.closing_steps = 0;
   options.swelling_steps = 0;
@@ -830,6 +846,8 @@ Result<Placed> place_as_given(const mesh::GarmentMesh& sewn, const mesh::Support
     done += 1;
     if (i + 1 < meshes.size() || meshes.size() == 1) {
       if (shaped) options.rolled = meshes[i].bent;
+      options.room_inside = meshes[i].room.inside;
+      options.room_outside = meshes[i].room.outside;
       x = relax(*meshes[i].mesh, x, support, options);
     }
     if (i == 0) break;
@@ -839,9 +857,82 @@ Result<Placed> place_as_given(const mesh::GarmentMesh& sewn, const mesh::Support
     const contact::Surface cloth = contact::make_surface(static_cast<int>(x.rows()), finer.faces, mesh::particles(finer));
     if (!contact::self_intersections(cloth, x).empty()) x = contact::untangle(cloth, x).x;
   }
+  laid.x = x;
+  laid.wanted = wanted_directions(garment, folded_flat, layout, start.x);
+  laid.fits = fit_of_parts(garment, layout, start.x, support, start.flattening);
+  return laid;
+}
+
+// Layers find their shape between the panels that they lie on, which stay, and the support.
+RelaxOptions layer_options(const RelaxOptions& shell, const std::vector<char>& free, const LaidLayers& layers, const PlaceParams& params) {
+  RelaxOptions options = shell;
+  const auto nearer = [&](double offset) { return std::max(params.clearance, kLayerOffset * offset); };
+  options.offset = nearer(options.offset);
+  for (double& offset : options.face_offsets) offset = nearer(offset);
+  options.closing_steps = options.swelling_steps = 0;
+  options.settling_steps = kLayerSettling * params.fine_steps;
+  options.polishing_steps = std::min(params.polishing_steps, kLayerPolishing);
+  options.seam *= kLayerSeam;
+  options.closed = kLayerClosed;
+  options.rolled = layers.smooth;
+  options.ironing = true;
+  for (const char f : free) options.held.push_back(!f);
+  return options;
+}
+
+Result<Placed> place_as_given(const mesh::GarmentMesh& sewn, const mesh::SupportMesh& support, const PlaceParams& params, const std::function<void(double)>& progress) {
+  Placed placed;
+  placed.garment = sewn;
+  const std::vector<char> free = free_panels(sewn);
+  if (std::find(free.begin(), free.end(), 1) == free.end()) {
+    TOILE_TRY(Laid laid, lay_shell(sewn, {}, support, params, progress));
+    placed.garment.x = laid.x;
+    placed.warnings = laid.warnings;
+    conclude(placed, support, params, laid.wanted);
+    placed.report.fits = laid.fits;
+    return placed;
+  }
+  Issues issues;
+  for (const auto& [name, spec] : params.panels) {
+    for (std::size_t p = 0; p < free.size(); ++p) {
+      if (!free[p] || sewn.panels[p].name != name) continue;
+      issues.push_back({.code = "free_layer", .place = {.item = "panels." + name}, .what = "it is a free layer, which goes where the panels under it are",
+                        .remedy = "leave its settings out, or set the panels that it lies on", .category = Category::input});
+    }
+  }
+  if (!issues.empty()) return issues;
+  // The shell leaves room for its layers; they are laid on it, and find their shape.
+  const double gap = kLayerGap * params.thickness;
+  const Rooms rooms = rooms_for_layers(sewn, gap);
+  std::vector<char> shell_panels;
+  for (const char f : free) shell_panels.push_back(!f);
+  const Subset shell = take_apart(sewn, shell_panels);
+  TOILE_TRY(Laid laid, lay_shell(shell.mesh, {shell.restricted(rooms.inside), shell.restricted(rooms.outside)}, support, params, [&](double f) {
+              if (progress) progress(kShellShare * f);
+            }));
+  placed.warnings = laid.warnings;
+  TOILE_TRY(const LaidLayers layers, lay_layers(sewn, shell.merged(laid.x, sewn.x), gap));
+  TOILE_TRY(const RelaxOptions shell_options, relax_options(support, params));
+  RelaxOptions options = layer_options(shell_options, free, layers, params);
+  options.progress = [&](double f) {
+    if (progress) progress(kShellShare + (1 - kShellShare) * f);
+  };
+  Points3 x = relax(sewn, layers.x, support, options);
+  if (const StrainSummary strain = edge_strain(sewn, x); strain.largest > options.max_strain || strain.rms > options.rms_strain) {
+    // Where layers find no room the panels under them give way.
+    options.held.clear();
+    options.settling_steps = 0;
+    options.polishing_steps = params.polishing_steps;
+    x = relax(sewn, x, support, options);
+  }
   placed.garment.x = x;
-  conclude(placed, support, params, wanted_directions(garment, folded_flat, layout, start.x));
-  placed.report.fits = fit_of_parts(garment, layout, start.x, support, start.flattening);
+  std::vector<std::optional<WantedDirection>> wanted(static_cast<std::size_t>(sewn.face_count()));
+  std::size_t row = 0;
+  for (std::size_t f = 0; f < wanted.size(); ++f) {
+    if (!free[static_cast<std::size_t>(sewn.face_panel[static_cast<Eigen::Index>(f)])]) wanted[f] = laid.wanted[row++];
+  }
+  conclude(placed, support, params, wanted);
+  placed.report.fits = laid.fits;
   return placed;
 }
 

@@ -20,12 +20,10 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr int kSubsteps = 8;        // between two searches for contacts
 // Momentum (heavy ball): without it the long waves of stretch take tens of times as many sweeps.
 constexpr double kCoast = 0.95;
 constexpr double kSpeed = 0.001;    // a vertex coasts at most so far in a substep [m]
 constexpr double kSeamMove = 0.004; // a seam draws a vertex at most so far in a sweep [m]
-constexpr double kClosed = 0.02;    // a seam that starts with a gap below this is held firmly: no limb gets through it [m]
 constexpr double kClosedSeam = 0.3; // part of its gap that one sweep closes
 constexpr double kBent = 0.05;      // an edge with a smaller rest angle counts as flat [rad]
 constexpr double kSharp = 1.0;      // from this rest angle the two sheets at a fold may touch [rad]
@@ -126,19 +124,25 @@ class Relaxation {
         stretches_(garment.panels.size()),
         bends_(garment.panels.size()),
         creases_(garment.panels.size()),
-        guards_(garment.panels.size()) {
+        guards_(garment.panels.size()),
+        free_(static_cast<std::size_t>(start.rows()), 1) {
+    if (!options.held.empty()) {
+      for (std::size_t v = 0; v < free_.size(); ++v) free_[v] = !options.held[static_cast<std::size_t>(garment.vertex_panel[static_cast<Eigen::Index>(v)])];
+    }
     std::set<std::pair<int, int>> bent;
     for (const mesh::Hinge& hinge : garment.hinges) {
       if (std::abs(hinge.rest_angle) < kBent) continue;
       bent.insert(std::minmax(hinge.v0, hinge.v1));
       const auto panel = static_cast<std::size_t>(garment.vertex_panel[hinge.v0]);
+      if (!free(hinge.v0)) continue;
       if (garment.vertex_panel[hinge.o0] != garment.vertex_panel[hinge.v0] || garment.vertex_panel[hinge.o1] != garment.vertex_panel[hinge.v0]) continue;
       creases_[panel].push_back(make_crease(hinge));
     }
     make_guards();
-    for (const mesh::Weld& weld : garment.welds) closed_.push_back((start.row(weld.a) - start.row(weld.b)).norm() < kClosed);
+    for (const mesh::Weld& weld : garment.welds) closed_.push_back((start.row(weld.a) - start.row(weld.b)).norm() < options.closed);
     for (const mesh::Edge& edge : mesh::edges(garment.faces)) {
       const auto panel = static_cast<std::size_t>(garment.vertex_panel[edge.a]);
+      if (!free(edge.a)) continue;
       stretches_[panel].push_back({edge.a, edge.b, (garment.uv.row(edge.a) - garment.uv.row(edge.b)).norm()});
       if (edge.faces.size() == 2 && !bent.count({edge.a, edge.b})) bends_[panel].push_back(make_bend(edge));
     }
@@ -154,6 +158,11 @@ class Relaxation {
     }
     // Neighbours along the cloth are no contacts.
     reach_ = std::clamp(0.4 * sum / static_cast<double>(std::max<std::size_t>(count, 1)), 1.2 * options.thickness, 3 * options.thickness);
+    double room = 0;
+    for (const auto* list : {&options.room_inside, &options.room_outside}) {
+      for (const double r : *list) room = std::max(room, r);
+    }
+    reach_ = std::max(reach_, 1.2 * (options.thickness + room));
     warm_.assign(walls_.size(), -1);
     warm_middles_.assign(count, -1);
   }
@@ -181,6 +190,8 @@ class Relaxation {
   }
 
  private:
+  bool free(int vertex) const { return free_[static_cast<std::size_t>(vertex)] != 0; }
+
   StrainSummary own_strain() const {
     StrainSummary summary;
     double sum = 0;
@@ -204,6 +215,8 @@ class Relaxation {
         const StrainSummary strain = own_strain();
         if (strain.largest <= options_.max_strain && strain.rms <= options_.rms_strain) break;
       }
+      // Strains that are left then are taken out without it.
+      ironing_ = options_.ironing && 3 * i < 2 * steps ? options_.bending * (1 - 1.5 * i / steps) : 0;
       find_tight();
       step(1, {.sweeps = 4, .seam = 0, .closed_seam = 0, .bending = 0});
     }
@@ -241,7 +254,7 @@ class Relaxation {
   void make_guards() {
     std::map<int, std::map<int, int>> turned;  // crease vertex -> its neighbours along the fold, +1 towards the face side
     for (const mesh::Hinge& hinge : garment_.hinges) {
-      if (std::abs(hinge.rest_angle) < kSharp) continue;
+      if (std::abs(hinge.rest_angle) < kSharp || !free(hinge.v0)) continue;
       turned[hinge.v0][hinge.v1] = turned[hinge.v1][hinge.v0] = hinge.rest_angle > 0 ? 1 : -1;
     }
     if (turned.empty()) return;
@@ -344,8 +357,9 @@ class Relaxation {
     }
     std::vector<Query> queries;
     for (std::size_t i = 0; i < walls_.size(); ++i) {
+      if (!free_[i]) continue;
       const Vector3d at = x_.row(static_cast<Eigen::Index>(i)).transpose();
-      if (!walls_[i].known || (at - walls_[i].at).squaredNorm() > kMoved * kMoved) queries.push_back({&walls_[i], at, &warm_[i]});
+      if (!walls_[i].known || (at - walls_[i].at).squaredNorm() > kMoved * kMoved) queries.push_back({&walls_[i], at, &warm_[i], options_.room_inside.empty() ? 0.0 : options_.room_inside[i]});
     }
     search(queries, flattening, depth);
     // Edges over a curved part of the support: their middles must stay outside too.
@@ -370,6 +384,7 @@ class Relaxation {
     Wall* wall;
     Vector3d at;
     int* warm;
+    double room = 0;  // beyond the wanted distance [m]
   };
 
   void search(const std::vector<Query>& queries, const Flattening& flattening, double depth) {
@@ -390,7 +405,7 @@ class Relaxation {
       if (!wall.active) return;
       wall.point = flattening.flattened(p.point);
       wall.normal = flattening.flattened_normal(p.normal, p.point);
-      wall.offset = options_.face_offsets.empty() ? options_.offset : options_.face_offsets[static_cast<std::size_t>(p.face)];
+      wall.offset = queries[i].room + (options_.face_offsets.empty() ? options_.offset : options_.face_offsets[static_cast<std::size_t>(p.face)]);
     });
   }
 
@@ -412,8 +427,11 @@ class Relaxation {
     const double lack = wanted_[i] - gap.dot(n);
     if (lack <= 0) return;
     double sum = 0;
-    for (double w : c.weight) sum += w * w;
-    for (std::size_t k = 0; k < 4; ++k) x_.row(c.node[k]) += (lack * c.weight[k] / sum) * n;
+    for (std::size_t k = 0; k < 4; ++k) sum += free(c.node[k]) ? c.weight[k] * c.weight[k] : 0;
+    if (sum < 1e-9) return;
+    for (std::size_t k = 0; k < 4; ++k) {
+      if (free(c.node[k])) x_.row(c.node[k]) += (lack * c.weight[k] / sum) * n;
+    }
   }
 
   void keep_outside(std::size_t vertex) {
@@ -434,19 +452,21 @@ class Relaxation {
     }
   }
 
+  void flatten(const Bend& bend, double part) {
+    Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
+    for (std::size_t k = 0; k < 4; ++k) sum += bend.k[k] * x_.row(bend.v[k]);
+    if (bend.rolled > 0) {
+      const double length = sum.norm();
+      if (length <= bend.rolled) return;
+      sum *= 1 - bend.rolled / length;
+    }
+    sum *= part / bend.k_sq;
+    for (std::size_t k = 0; k < 4; ++k) x_.row(bend.v[k]) -= bend.k[k] * sum;
+  }
+
   void sweep_panel(std::size_t panel, double bending, bool forward) {
     if (bending > 0) {
-      for (const Bend& bend : bends_[panel]) {
-        Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
-        for (std::size_t k = 0; k < 4; ++k) sum += bend.k[k] * x_.row(bend.v[k]);
-        if (bend.rolled > 0) {
-          const double length = sum.norm();
-          if (length <= bend.rolled) continue;
-          sum *= 1 - bend.rolled / length;
-        }
-        sum *= bending / bend.k_sq;
-        for (std::size_t k = 0; k < 4; ++k) x_.row(bend.v[k]) -= bend.k[k] * sum;
-      }
+      for (const Bend& bend : bends_[panel]) flatten(bend, bending);
     }
     if (bending > 0) {
       for (const Crease& crease : creases_[panel]) {
@@ -467,6 +487,12 @@ class Relaxation {
     for (const Guard& guard : guards_[panel]) keep(guard);
   }
 
+  // What a held one does not move, the other does.
+  void draw_together(int a, int b, const Eigen::RowVector3d& move) {
+    if (free(a)) x_.row(a) += free(b) ? move : 2 * move;
+    if (free(b)) x_.row(b) -= free(a) ? move : 2 * move;
+  }
+
   void sweep(const Step& step, bool forward) {
     if (step.seam > 0 || step.closed_seam > 0) {
       for (std::size_t w = 0; w < garment_.welds.size(); ++w) {
@@ -476,9 +502,7 @@ class Relaxation {
         const double open = length - 1.5 * options_.thickness;
         if (open <= 0) continue;
         const double part = closed_[w] ? std::max(step.seam, step.closed_seam) : step.seam;
-        const double move = std::min(0.5 * part * open, kSeamMove);
-        x_.row(weld.a) += (move / length) * d;
-        x_.row(weld.b) -= (move / length) * d;
+        draw_together(weld.a, weld.b, (std::min(0.5 * part * open, kSeamMove) / length) * d);
       }
     }
     if (step.closed_seam > 0) {
@@ -495,9 +519,7 @@ class Relaxation {
         const double length = d.norm();
         const double open = length - std::max(fastener.length, 1.5 * options_.thickness);
         if (open <= 0) continue;
-        const double move = std::min(0.5 * step.seam * open, kSeamMove);
-        x_.row(fastener.a) += (move / length) * d;
-        x_.row(fastener.b) -= (move / length) * d;
+        draw_together(fastener.a, fastener.b, (std::min(0.5 * step.seam * open, kSeamMove) / length) * d);
       }
     }
     parallel_for(stretches_.size(), 1, [&](std::size_t panel) { sweep_panel(panel, step.bending, forward); });
@@ -546,6 +568,14 @@ class Relaxation {
     for (std::size_t i = 0; i < near.size(); ++i) {
       if (near[i]) tight_vertices_.push_back(i);
     }
+    tight_bends_.clear();
+    if (ironing_ > 0) {
+      for (const auto& list : bends_) {
+        for (const Bend& bend : list) {
+          if (std::all_of(bend.v.begin(), bend.v.end(), [&](int v) { return near[static_cast<std::size_t>(v)] != 0; })) tight_bends_.push_back(bend);
+        }
+      }
+    }
     is_tight_ = std::move(near);
   }
 
@@ -560,6 +590,9 @@ class Relaxation {
       }
     }
     for (int k = 0; k < kTightSweeps; ++k) {
+      if (k % 4 == 0) {
+        for (const Bend& bend : tight_bends_) flatten(bend, ironing_);
+      }
       if (k % 2 == 0) {
         for (auto it = tight_.begin(); it != tight_.end(); ++it) keep(*it);
       } else {
@@ -574,8 +607,10 @@ class Relaxation {
     contacts_.clear();
     normals_.clear();
     wanted_.clear();
+    const bool rooms = !options_.room_inside.empty();
+    if (rooms) find_sides();
     for (const contact::Contact& c : search_.proximity(x_, x_, {.self = reach_}).self) {
-      if (c.distance < 1e-7) continue;
+      if (c.distance < 1e-7 || std::none_of(c.node.begin(), c.node.end(), [&](int v) { return free(v); })) continue;
       Eigen::RowVector3d gap = Eigen::RowVector3d::Zero();
       for (std::size_t k = 0; k < 4; ++k) gap += c.weight[k] * x_.row(c.node[k]);
       contacts_.push_back(c);
@@ -586,16 +621,42 @@ class Relaxation {
         Eigen::RowVector2d way = Eigen::RowVector2d::Zero();
         for (std::size_t k = 0; k < 4; ++k) way += c.weight[k] * garment_.uv.row(c.node[k]);
         wanted = std::min(wanted, kFoldGap * way.norm());
+      } else if (rooms) {
+        wanted += room_between(c, normals_.back());
       }
       wanted_.push_back(wanted);
     }
+  }
+
+  // Face sides of the vertices, as they lie.
+  void find_sides() {
+    sides_ = Points3::Zero(x_.rows(), 3);
+    for (Eigen::Index f = 0; f < garment_.face_count(); ++f) {
+      const Eigen::RowVector3d a = x_.row(garment_.faces(f, 0)), b = x_.row(garment_.faces(f, 1)), c = x_.row(garment_.faces(f, 2));
+      const Eigen::RowVector3d cross = (b - a).cross(c - a);
+      for (int k = 0; k < 3; ++k) sides_.row(garment_.faces(f, k)) += cross;
+    }
+  }
+
+  // Of the layers that lie on the two sheets of a contact, on the sides that look at one another.
+  // n  from the second to the first [unit]
+  double room_between(const contact::Contact& c, const Eigen::RowVector3d& n) const {
+    const auto first = static_cast<std::size_t>(contact::first_count(c.kind));
+    double room[2] = {0, 0};
+    for (std::size_t k = 0; k < 4; ++k) {
+      const bool faces_other = sides_.row(c.node[k]).dot(k < first ? -n : n) > 0;
+      const auto v = static_cast<std::size_t>(c.node[k]);
+      double& side = room[k < first ? 0 : 1];
+      side = std::max(side, faces_other ? options_.room_outside[v] : options_.room_inside[v]);
+    }
+    return room[0] + room[1];
   }
 
   void step(double s, const Step& step) {
     find_walls(s);
     find_contacts();
     const Points3 start = x_;
-    for (int k = 0; k < kSubsteps; ++k) {
+    for (int k = 0; k < options_.substeps; ++k) {
       before_ = x_;
       x_ += kCoast * v_;
       sweep_tight();
@@ -626,8 +687,12 @@ class Relaxation {
   std::vector<std::vector<Bend>> bends_;
   std::vector<std::vector<Crease>> creases_;
   std::vector<std::vector<Guard>> guards_;
+  std::vector<char> free_;    // by vertex: it may move
+  Points3 sides_;             // normals at the vertices, not of unit length
   std::vector<char> closed_;  // by weld: nearly closed at the start
   std::vector<Stretch> tight_;               // while polishing
+  std::vector<Bend> tight_bends_;
+  double ironing_ = 0;                       // of them: part of a curvature that a sweep takes out
   std::vector<std::size_t> tight_vertices_;  // of tight_
   std::vector<char> is_tight_;               // by vertex
   std::vector<contact::Contact> contacts_;

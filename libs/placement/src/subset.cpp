@@ -1,5 +1,7 @@
 #include "toile/placement/subset.h"
 
+#include "toile/mesh/remove_panels.h"
+
 namespace toile::placement {
 
 Points3 Subset::restricted(const Points3& whole) const {
@@ -8,10 +10,28 @@ Points3 Subset::restricted(const Points3& whole) const {
   return x;
 }
 
+std::vector<double> Subset::restricted(const std::vector<double>& whole) const {
+  std::vector<double> values;
+  if (whole.empty()) return values;
+  for (const int v : vertex_of) values.push_back(whole[static_cast<std::size_t>(v)]);
+  return values;
+}
+
 Points3 Subset::merged(const Points3& subset, const Points3& whole) const {
   Points3 x = whole;
   for (std::size_t i = 0; i < vertex_of.size(); ++i) x.row(vertex_of[i]) = subset.row(static_cast<Eigen::Index>(i));
   return x;
+}
+
+Subset take_apart(const mesh::GarmentMesh& garment, const std::vector<char>& keep) {
+  Subset subset;
+  std::vector<char> removed;
+  for (const char k : keep) removed.push_back(!k);
+  subset.mesh = mesh::without_panels(garment, removed);
+  for (Eigen::Index v = 0; v < garment.vertex_count(); ++v) {
+    if (keep[static_cast<std::size_t>(garment.vertex_panel[v])]) subset.vertex_of.push_back(static_cast<int>(v));
+  }
+  return subset;
 }
 
 Subset take(const mesh::GarmentMesh& garment, const std::vector<char>& keep) {

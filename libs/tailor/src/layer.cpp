@@ -3,9 +3,9 @@
 #include "line_part.h"
 #include "names.h"
 #include "region.h"
-#include "remove_panels.h"
 
 #include "toile/base/text.h"
+#include "toile/mesh/remove_panels.h"
 #include "toile/tailor/trim.h"
 
 #include <algorithm>
@@ -114,7 +114,7 @@ class Layering {
       issues_.push_back({"piece_sewn", {.item = "panel " + name}, fmt::format("it is to be laid on other cloth, but seam {} sews it", garment.seams[static_cast<std::size_t>(seam)].name), "bond it or sew it; a layer that is sewn is a free one"});
     }
     if (!sewn.empty()) return garment;
-    return without_panels(garment, taken);
+    return mesh::without_panels(garment, taken);
   }
 
   void assign_cloth() {

@@ -23,6 +23,7 @@ struct CoarseGarment {
   /// isometric fine one but for the folds between triangles.
   Points3 prolonged(const Points3& coarse) const;
   Points3 restricted(const Points3& fine) const;
+  std::vector<double> restricted(const std::vector<double>& fine) const;  ///< empty stays empty
 };
 
 /// size  wanted edge length [m]

@@ -35,9 +35,14 @@ struct RelaxOptions {
   double max_strain = 0.004;   ///< largest edge strain at which polishing stops [1]
   double rms_strain = 0.0008;  ///< and root mean square [1]
   double seam = 0.05;          ///< part of a seam's gap that one sweep closes
+  double closed = 0.02;        ///< a seam that starts with a smaller gap is held firmly: no limb gets through it [m]
+  bool ironing = false;        ///< bending goes on where polishing finds large strains: creases that should not be there lose themselves
+  int substeps = 8;            ///< of a step, between two searches for contacts
   double bending = 0.1;        ///< part of a curvature that one sweep takes out, until polishing
   Points3 rolled;              ///< |V| x 3 or empty: bending up to the curvature there is free [m]
   Sides sides;
+  std::vector<double> room_inside, room_outside;  ///< |V| or empty: taken up by layers at a vertex's back and at its face, added to offset and thickness [m]
+  std::vector<char> held;      ///< |panels| or empty, non-zero: panels that do not move
   std::vector<Target> targets; ///< vertices drawn to places as seams that start closed are, until they let go
   std::function<void(double)> progress;  ///< called with 0..1 if given
 };

@@ -1,8 +1,8 @@
-#include "remove_panels.h"
+#include "toile/mesh/remove_panels.h"
 
 #include <algorithm>
 
-namespace toile::tailor {
+namespace toile::mesh {
 namespace {
 
 /// New index of every kept row; -1 for the others.
@@ -38,9 +38,9 @@ Rows kept_rows(const Rows& rows, const std::vector<int>& number) {
   return kept;
 }
 
-void keep(std::map<std::string, mesh::Column>& columns, const std::vector<int>& number) {
+void keep(std::map<std::string, Column>& columns, const std::vector<int>& number) {
   for (auto& [name, column] : columns) {
-    mesh::Column kept;
+    Column kept;
     kept.integer = column.integer;
     for (std::size_t k = 0; k < number.size(); ++k) {
       if (number[k] < 0) continue;
@@ -53,8 +53,8 @@ void keep(std::map<std::string, mesh::Column>& columns, const std::vector<int>& 
 
 }  // namespace
 
-mesh::GarmentMesh without_panels(const mesh::GarmentMesh& garment, const std::vector<char>& removed) {
-  mesh::GarmentMesh g = garment;
+GarmentMesh without_panels(const GarmentMesh& garment, const std::vector<char>& removed) {
+  GarmentMesh g = garment;
   const auto gone = [&](int panel) { return removed[static_cast<std::size_t>(panel)] != 0; };
   const auto panel = renumbered(g.panels.size(), [&](std::size_t p) { return !removed[p]; });
   const auto vertex = renumbered(static_cast<std::size_t>(g.vertex_count()), [&](std::size_t v) { return !gone(g.vertex_panel[static_cast<Eigen::Index>(v)]); });
@@ -77,13 +77,13 @@ mesh::GarmentMesh without_panels(const mesh::GarmentMesh& garment, const std::ve
   }
 
   const auto lost = [&](int v) { return vertex[static_cast<std::size_t>(v)] < 0; };
-  for (const auto& weld : g.welds) TOILE_CHECK(!lost(weld.a) && !lost(weld.b), "vertices {} and {} of a removed panel are sewn", weld.a, weld.b);
-  for (const auto& fastener : g.fasteners) TOILE_CHECK(!lost(fastener.a) && !lost(fastener.b), "vertices {} and {} of a removed panel are fastened", fastener.a, fastener.b);
+  std::erase_if(g.welds, [&](const auto& weld) { return lost(weld.a) || lost(weld.b); });
+  std::erase_if(g.fasteners, [&](const auto& fastener) { return lost(fastener.a) || lost(fastener.b); });
   for (auto& weld : g.welds) of(vertex, weld.a), of(vertex, weld.b);
   for (auto& fastener : g.fasteners) of(vertex, fastener.a), of(vertex, fastener.b);
-  std::erase_if(g.hinges, [&](const auto& hinge) { return lost(hinge.v0); });
+  std::erase_if(g.hinges, [&](const auto& hinge) { return lost(hinge.v0) || lost(hinge.v1) || lost(hinge.o0) || lost(hinge.o1); });
   for (auto& hinge : g.hinges) of(vertex, hinge.v0), of(vertex, hinge.v1), of(vertex, hinge.o0), of(vertex, hinge.o1);
-  std::erase_if(g.trim_segments, [&](const auto& segment) { return lost(segment.a); });
+  std::erase_if(g.trim_segments, [&](const auto& segment) { return lost(segment.a) || lost(segment.b); });
   for (auto& segment : g.trim_segments) of(vertex, segment.a), of(vertex, segment.b);
   std::erase_if(g.run_vertices, [&](const auto& row) { return run[static_cast<std::size_t>(row.run)] < 0; });
   for (auto& row : g.run_vertices) of(run, row.run), of(vertex, row.vertex);
@@ -113,14 +113,14 @@ mesh::GarmentMesh without_panels(const mesh::GarmentMesh& garment, const std::ve
   for (auto& row : g.runs) of(panel, row.panel);
   for (auto& layer : g.free_layers) {
     for (auto* list : {&layer.panels, &layer.on}) {
-      for (int& p : *list) {
-        TOILE_CHECK(!gone(p), "free layer {} names removed panel {}", layer.name, p);
-        of(panel, p);
-      }
+      std::erase_if(*list, gone);
+      for (int& p : *list) of(panel, p);
     }
   }
+  const auto layer = renumbered(g.free_layers.size(), [&](std::size_t k) { return !g.free_layers[k].panels.empty() && !g.free_layers[k].on.empty(); });
+  keep(g.free_layers, layer);
   keep(g.panels, panel);
   return g;
 }
 
-}  // namespace toile::tailor
+}  // namespace toile::mesh
