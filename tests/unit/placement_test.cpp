@@ -716,6 +716,9 @@ mesh::GarmentMesh lined_tube() {
 
 TEST(layers, lie_on_the_back_of_their_panels) {
   auto g = lined_tube();
+  for (Eigen::Index v = 0; v < g.vertex_count(); ++v) {
+    if (g.vertex_panel[v] == 1) g.x(v, 0) += 1;  // beside the front: as cut, both lie in one place
+  }
   const auto laid = lay_layers(g, g.x, 0.0015);
   ASSERT_TRUE(laid.has_value());
   EXPECT_EQ(laid->cuts, 0);
