@@ -159,7 +159,7 @@ Experiment incline(const Scope& scope) {
       const double a = std::atan(part * mu);
       const Eigen::Vector3d down = std::sin(a) * along(strip) - std::cos(a) * Eigen::Vector3d::UnitZ();
       std::string spec = fmt::format("mode: motion\nduration: 1 s\ntime_step: 0.01 s\nair_drag: 0\nsupport_friction: {}\ngravity_direction: {}\nrecord: record.csv\nwatch: [strip]\n", mu, vector_yaml(down));
-      spec += scope.newton_accuracy ? "newton_accuracy: 1e-10\n" : "newton_iterations: 20\nnewton_residual: 0.001\n";
+      spec += scope.newton_accuracy ? "newton_accuracy: 1e-10 m\n" : "newton_iterations: 20\nnewton_residual: 0.001\n";
       Case c = strip_case(fmt::format("woven_{}", part), strip, suiting(), spec);
       put_on(c, box(2, -(reach - suiting().weight * earth * std::cos(a) / push_stiffness), true));
       e.cases.push_back(c);
