@@ -152,13 +152,6 @@ lab::Outcome run_case(const lab::Case& c, const fs::path& folder, bool wants_gar
   return outcome;
 }
 
-/// Whether the simulator beside this program has a parameter.
-bool simulator_has(const std::string& parameter, const fs::path& folder) {
-  if (run_program({(own_folder() / "toile-simulate").string(), "--schema"}, folder.string(), "schema.json", "schema.log") != 0) return false;
-  const auto schema = io::read_file(folder / "schema.json");
-  return schema && schema->find('"' + parameter + '"') != std::string::npos;
-}
-
 struct LabStage {
   using Params = ::Params;
 
@@ -214,8 +207,6 @@ struct LabStage {
     scope.quick = params.quick;
     scope.woven = params.model != Models::particle;
     scope.particle = params.model != Models::woven;
-    scope.internal_friction = simulator_has("internal_friction", work);
-    scope.newton_accuracy = simulator_has("newton_accuracy", work);
     const std::vector<lab::Experiment> experiments = lab::experiments(scope, only);
     struct Job {
       std::size_t experiment, index;

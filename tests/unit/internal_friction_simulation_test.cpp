@@ -1,16 +1,17 @@
 // KES-F's bending test, a cantilever and a released bend with friction between the yarns, through the simulation.
 #include "cloth_fixtures.h"
+#include "tables.h"
 #include "toile/base/parallel.h"
 #include "toile/dynamics/simulate.h"
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
-#include <sstream>
 
 namespace toile::dynamics {
 namespace {
 
 using mesh::GarmentMesh;
+using test::column;
 
 constexpr double b_warp = 0.080 * 9.80665e-5, loop = 0.070 * 9.80665e-3;  // 0.080 gf cm2/cm, 0.070 gf cm/cm
 
@@ -55,25 +56,6 @@ std::vector<ConstraintSpec> bending_machine(const std::vector<double>& curvature
     jaw.move.push_back(move);
   }
   return {fixed, jaw};
-}
-
-std::vector<double> column(const std::string& csv, const std::string& name) {
-  std::istringstream in(csv);
-  std::string line, cell;
-  std::getline(in, line);
-  std::istringstream head(line);
-  int wanted = -1;
-  for (int i = 0; std::getline(head, cell, ','); ++i) {
-    if (cell == name) wanted = i;
-  }
-  EXPECT_GE(wanted, 0) << name;
-  std::vector<double> values;
-  while (std::getline(in, line)) {
-    std::istringstream row(line);
-    for (int i = 0; i <= wanted; ++i) std::getline(row, cell, ',');
-    values.push_back(std::stod(cell));
-  }
-  return values;
 }
 
 /// 1 cm between jaws, to 2.5/cm and back: B, 2HB; then let go from 2/cm: the bend that stays.

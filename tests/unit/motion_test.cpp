@@ -1,16 +1,17 @@
 #include "cloth_fixtures.h"
+#include "tables.h"
 #include "toile/base/parallel.h"
 #include "toile/dynamics/air.h"
 #include "toile/dynamics/simulate.h"
 
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
-#include <sstream>
 
 namespace toile::dynamics {
 namespace {
 
 using mesh::GarmentMesh;
+using test::column;
 
 TEST(Air, DragAndLiftOfAPlate) {
   const std::vector<std::array<int, 3>> corners{{0, 1, 2}, {0, 2, 3}};
@@ -73,25 +74,6 @@ SimulationOutcome run(const GarmentMesh& g, const SimulationParams& params) {
   set_thread_count(0);
   EXPECT_TRUE(result) << to_string(result.issues().front());
   return std::move(*result);
-}
-
-std::vector<double> column(const std::string& csv, const std::string& name) {
-  std::istringstream in(csv);
-  std::string line, cell;
-  std::getline(in, line);
-  std::istringstream head(line);
-  int wanted = -1;
-  for (int i = 0; std::getline(head, cell, ','); ++i) {
-    if (cell == name) wanted = i;
-  }
-  EXPECT_GE(wanted, 0) << name;
-  std::vector<double> values;
-  while (std::getline(in, line)) {
-    std::istringstream row(line);
-    for (int i = 0; i <= wanted; ++i) std::getline(row, cell, ',');
-    values.push_back(std::stod(cell));
-  }
-  return values;
 }
 
 /// A soft strip that swings and stretches; how much nearer half the step brings it to the limit.

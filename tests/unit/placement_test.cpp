@@ -1,6 +1,7 @@
 #include "toile/placement/place.h"
 
 #include "garments.h"
+#include "people.h"
 #include "toile/form/form.h"
 #include "toile/geometry/wrap.h"
 #include "toile/base/parallel.h"
@@ -29,14 +30,9 @@ namespace {
 
 const mesh::SupportMesh& man() {
   static const mesh::SupportMesh mesh = [] {
-    form::Measurements m;
-    m.chest = 1.0, m.waist = 0.783, m.hips = 0.928, m.seat = 0.977, m.neck = 0.4, m.biceps = 0.318, m.wrist = 0.165;
-    m.shoulderToShoulder = 0.43, m.shoulderSlope = 21 * M_PI / 180, m.hpsToWaistBack = 0.46, m.hpsToBust = 0.265;
-    m.waistToArmpit = 0.215, m.waistToHips = 0.13, m.waistToSeat = 0.22, m.waistToFloor = 1.085;
-    m.shoulderToElbow = 0.32, m.shoulderToWrist = 0.575, m.waistToUpperLeg = 0.27;
     form::FormParams p;
     p.vertices = 1500;
-    return form::make_form(m, p)->mesh;
+    return form::make_form(testing_people::man(), p)->mesh;
   }();
   return mesh;
 }

@@ -225,14 +225,14 @@ Experiment kes_bending(const Scope& scope) {
           turns.push_back(angle);
         }
         const Eigen::Vector3d axis = along(strip).cross(Eigen::Vector3d::UnitZ());
-        std::string spec = common(Model::woven, 1e-4, 1000) + (scope.internal_friction ? "internal_friction: yes\n" : "") + fmt::format("gravity: 0\nincrements: {}\nduration: {} s\nconstraints:\n  - {{name: fixed, on: [strip.clamp], kind: clamp}}\n", curvature.size() - 1, curvature.size() - 1);
+        std::string spec = common(Model::woven, 1e-4, 1000) + fmt::format("internal_friction: yes\ngravity: 0\nincrements: {}\nduration: {} s\nconstraints:\n  - {{name: fixed, on: [strip.clamp], kind: clamp}}\n", curvature.size() - 1, curvature.size() - 1);
         spec += path_yaml("jaw", "[strip.tip]", "clamp", moves, turns, axis, place(strip, gauge, 0.5 * strip.width));
         keys.push_back({warp, net});
         e.cases.push_back(strip_case(fmt::format("woven_{}_{}", strip.file_name(), warp), strip, suiting(), spec));
       }
     }
   }
-  e.judge = [=, friction = scope.internal_friction](const std::vector<Outcome>& outcomes) {
+  e.judge = [=](const std::vector<Outcome>& outcomes) {
     Section section;
     Plot plot{.name = "kes_bending", .title = "KES-F bending of the suiting", .x_label = "curvature [1/cm]", .y_label = "moment per width [mN]", .curves = {}};
     const Cloth cloth = suiting();
@@ -276,7 +276,6 @@ Experiment kes_bending(const Scope& scope) {
         b.value = 0.5 * (slope(up, 50, 150) + slope(down, -150, -50));
         loop.value = interpolated(up[0], up[1], 100) - interpolated(down[0], down[1], 100);
         rest.value = interpolated(down[1], down[0], 0);
-        if (!friction) loop.note = rest.note = "the simulator has no internal friction yet";
         Curve curve{fmt::format("{}, {}", subject, name_of(net)), {}, {}, false};
         for (std::size_t k = 0; k < moment.size(); ++k) {
           curve.x.push_back(curvature[k + 1]);

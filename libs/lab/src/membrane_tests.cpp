@@ -19,7 +19,7 @@ std::string common(Model model, double residual, int iterations) {
   return fmt::format("model: {}\nself_reach: 0.1 mm\nresidual: {}\nmax_iterations: {}\nrecord: record.csv\n", name_of(model), format_number(residual), iterations);
 }
 
-std::string sliders(const Scope& scope, Model model) { return scope.internal_friction && model == Model::woven ? "internal_friction: yes\n" : ""; }
+std::string sliders(Model model) { return model == Model::woven ? "internal_friction: yes\n" : ""; }
 
 std::string increments(std::size_t count) { return fmt::format("increments: {}\nduration: {} s\n", count, count); }
 
@@ -145,13 +145,13 @@ Experiment kes_tension(const Scope& scope) {
         const double emt = warp == 0 ? cloth.emt_warp : cloth.emt_weft;
         std::vector<Eigen::Vector3d> moves;
         for (int i = 0; i <= 2 * steps; ++i) moves.push_back(strip.length * emt * (i <= steps ? i : 2 * steps - i) / steps * along(strip));
-        const std::string spec = common(model, 1e-4, 1000) + sliders(scope, model) + increments(moves.size() - 1) + "gravity: 0\nconstraints:\n  - {name: fixed, on: [strip.clamp]}\n" + path_yaml("jaw", "[strip.tip]", "drive", moves);
+        const std::string spec = common(model, 1e-4, 1000) + sliders(model) + increments(moves.size() - 1) + "gravity: 0\nconstraints:\n  - {name: fixed, on: [strip.clamp]}\n" + path_yaml("jaw", "[strip.tip]", "drive", moves);
         e.cases.push_back(strip_case(fmt::format("{}_{}_{}", name_of(model), strip.file_name(), warp), strip, cloth, spec));
         keys.push_back({strip, model});
       }
     }
   }
-  e.judge = [=, friction = scope.internal_friction](const std::vector<Outcome>& outcomes) {
+  e.judge = [=](const std::vector<Outcome>& outcomes) {
     Section section;
     Plot plot{.name = "kes_tension", .title = "KES-F tension of the suiting", .x_label = "strain [%]", .y_label = "force per width [N/m]", .curves = {}};
     for (const bool warp : {true, false}) {
@@ -193,7 +193,7 @@ Experiment kes_tension(const Scope& scope) {
           resilience.value = down / up;
         }
         if (model == Model::particle) linearity.note = work.note = "linear springs";
-        if (!friction || model == Model::particle) resilience.note = "the simulator has no tensile hysteresis yet";
+        if (model == Model::particle) resilience.note = "the model has no tensile hysteresis";
         if (model == Model::particle) resilience.note = "the model has no hysteresis";
         Curve curve{fmt::format("{}, {}, {}", warp ? "warp" : "weft", name_of(model), name_of(strip.net)), {}, {}, false};
         for (std::size_t k = 0; k < f.size(); ++k) {
@@ -232,12 +232,12 @@ Experiment kes_shear(const Scope& scope) {
       const Strip strip{.length = 0.05, .width = 0.2, .warp = 0, .cell = 0.01, .net = net};
       std::vector<Eigen::Vector3d> moves;
       for (const double a : angle) moves.push_back(strip.length * (std::sin(radians(a)) * across(strip) + (std::cos(radians(a)) - 1) * along(strip)));
-      const std::string spec = common(model, 1e-5, 1000) + sliders(scope, model) + increments(moves.size() - 1) + "gravity: 0\nconstraints:\n  - {name: fixed, on: [strip.clamp]}\n" + path_yaml("jaw", "[strip.tip]", "drive", moves);
+      const std::string spec = common(model, 1e-5, 1000) + sliders(model) + increments(moves.size() - 1) + "gravity: 0\nconstraints:\n  - {name: fixed, on: [strip.clamp]}\n" + path_yaml("jaw", "[strip.tip]", "drive", moves);
       e.cases.push_back(strip_case(fmt::format("{}_{}", name_of(model), strip.file_name()), strip, cloth, spec));
       keys.push_back({strip, model});
     }
   }
-  e.judge = [=, friction = scope.internal_friction](const std::vector<Outcome>& outcomes) {
+  e.judge = [=](const std::vector<Outcome>& outcomes) {
     Section section;
     Plot plot{.name = "kes_shear", .title = "KES-F shear of the suiting", .x_label = "angle [°]", .y_label = "force per width [N/m]", .curves = {{"G of the card", {-8, 8}, {-cloth.g * radians(8), cloth.g * radians(8)}, true}}};
     for (std::size_t i = 0; i < keys.size(); ++i) {
@@ -266,7 +266,6 @@ Experiment kes_shear(const Scope& scope) {
           loop5.value = interpolated(part(48, 80, angle), part(48, 80, f), 5) - interpolated(part(16, 48, angle), part(16, 48, f), 5);
         }
         if (model == Model::particle) loop.note = loop5.note = "the model has no hysteresis";
-        else if (!friction) loop.note = loop5.note = "the simulator has no internal friction yet";
         plot.curves.push_back({fmt::format("{}, {}", name_of(model), name_of(strip.net)), angle, f, false});
       }
       for (const Row& row : {g, loop, loop5}) section.rows.push_back(row);

@@ -54,8 +54,6 @@ struct Experiment {
 struct Scope {
   bool quick = false;
   bool woven = true, particle = true;
-  bool internal_friction = false;  ///< the simulator has sliders for 2HB, 2HG and RT
-  bool newton_accuracy = false;    ///< and ends steps of motion by that parameter
 };
 
 /// Names and titles of all tests, in order of the report.
