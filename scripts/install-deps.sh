@@ -3,7 +3,7 @@
 set -eu
 
 required="g++ cmake ninja-build make libeigen3-dev libfmt-dev libtbb-dev libxxhash-dev libyaml-cpp-dev nlohmann-json3-dev
-libcli11-dev libcgal-dev libassimp-dev libfcl-dev libsuitesparse-dev libgtest-dev libpng-dev libembree-dev"
+libcli11-dev libcgal-dev libassimp-dev libfcl-dev libsuitesparse-dev libgtest-dev libpng-dev libembree-dev libzmq3-dev"
 
 missing=""
 for package in $required; do
