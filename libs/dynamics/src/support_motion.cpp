@@ -70,7 +70,7 @@ class TableMotion final : public SupportMotion {
     return at(0);
   }
   Result<SupportState> advance(double time, double step) override { return at(time + step); }
-  Issues finish(bool, const std::vector<BodyWrench>&) override { return {}; }
+  Result<Verdict> finish(bool, const std::vector<BodyWrench>&) override { return Verdict::holds; }
 
  private:
   SupportState at(double time) const {
@@ -116,7 +116,7 @@ class ShapeMotion final : public SupportMotion {
     return at(0);
   }
   Result<SupportState> advance(double time, double step) override { return at(time + step); }
-  Issues finish(bool, const std::vector<BodyWrench>&) override { return {}; }
+  Result<Verdict> finish(bool, const std::vector<BodyWrench>&) override { return Verdict::holds; }
 
  private:
   SupportState at(double time) const {

@@ -53,8 +53,13 @@ class SupportMotion {
   virtual Result<SupportState> start(double duration) = 0;
   /// The state at time + step, or an earlier one if the source can go no farther in one step (then the step is shortened to it).
   virtual Result<SupportState> advance(double time, double step) = 0;
-  /// The step has been computed: at its end the cloth does this to the bodies. Not accepted: it has to be repeated.
-  virtual Issues finish(bool accepted, const std::vector<BodyWrench>& wrenches) = 0;
+  enum class Verdict {
+    holds,
+    undone,  ///< the source takes back a step that the simulator would have kept: the state of the step's beginning is to be restored to
+             ///< the last bit, and advance is called again from there, with the step as long as the last one was asked for
+  };
+  /// The step has been computed: at its end the cloth does this to the bodies. Not accepted: it has to be repeated, whatever the verdict.
+  virtual Result<Verdict> finish(bool accepted, const std::vector<BodyWrench>& wrenches) = 0;
 };
 
 /// A table of trajectories: rows of time, body, x, y, z, qw, qx, qy, qz. Between rows a body screws evenly.
