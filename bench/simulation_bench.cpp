@@ -16,6 +16,7 @@
 #include "cases.h"
 #include "cloth_fixtures.h"
 #include "process.h"
+#include "quality.h"
 #include "report.h"
 #include "toile/base/text.h"
 #include "toile/io/file.h"
@@ -25,6 +26,9 @@
 namespace {
 
 using namespace toile;
+using bench::figure;
+using bench::larger;
+using bench::quality;
 using bench::Usage;
 namespace fs = std::filesystem;
 
@@ -94,20 +98,6 @@ mesh::Points3 read_obj_points(const std::string& file) {
   return x;
 }
 
-/// Strains, cuts and penetration of a result, by the program that measures garments.
-nlohmann::ordered_json quality(const std::string& bin, const std::string& garment, const std::string& support, const std::string& work) {
-  const std::string file = work + "/quality.json";
-  fs::remove(file);
-  bench::timed({bin + "/toile-measure", garment, "--support", support, "-o", file, "--quiet"});
-  nlohmann::ordered_json row = nlohmann::ordered_json::object();
-  if (!fs::exists(file)) return row;
-  const auto measured = nlohmann::ordered_json::parse(*io::read_file(file), nullptr, false);
-  for (const char* key : {"max_strain_warp", "max_strain_weft", "p99_strain_warp", "p99_strain_weft", "max_strain_bias", "self_intersections", "support_intersections", "penetrating_vertices"}) {
-    if (measured.contains(key)) row[key] = measured[key];
-  }
-  return row;
-}
-
 std::optional<std::string> blender() {
   const char* path = std::getenv("PATH");
   for (const std::string& folder : split(path ? path : "", ':')) {
@@ -165,9 +155,6 @@ std::optional<Peer> run_blender(const std::string& program, const std::string& s
   peer.quality = quality(bin, file, folder + "/support.ply", folder);
   return peer;
 }
-
-int figure(const nlohmann::ordered_json& q, const char* key) { return q.contains(key) && q[key].is_number() ? q[key].get<int>() : -1; }
-double larger(const nlohmann::ordered_json& q, const char* a, const char* b) { return q.contains(a) && q.contains(b) ? std::max(q[a].get<double>(), q[b].get<double>()) : -1; }
 
 }  // namespace
 
