@@ -1,7 +1,7 @@
 #include "results.h"
 #include "toile/io/file.h"
 #include "toile/io/record_yaml.h"
-#include "toile/mechanism/frame.h"
+#include "toile/mechanism/inertia.h"
 
 #include <gtest/gtest.h>
 
@@ -253,4 +253,98 @@ TEST(softtop, opens_by_110_degrees_and_never_needs_longer_cloth) {
   }
   EXPECT_LT(high.y() - low.y(), 0.55);
   EXPECT_LT(high.z() - low.z(), 0.45);
+}
+
+TEST(inertia, curvatures_are_the_derivatives_of_the_rates) {
+  const double e = 1e-5;
+  const auto c = checked(follow(four_bar(0.2, {0.45, 0.4}, 0.5), {0.5 - e, 0.5, 0.5 + e}));
+  for (std::size_t b = 0; b < 3; ++b) {
+    EXPECT_NEAR((c[2].rates[b].angle - c[0].rates[b].angle) / (2 * e), c[1].curvatures[b].angle, 1e-7);
+    EXPECT_LT(((c[2].rates[b].shift - c[0].rates[b].shift) / (2 * e) - c[1].curvatures[b].shift).norm(), 1e-7);
+  }
+}
+
+namespace {
+
+/// A rod of 400 mm that hangs from a pivot at (0.1, 0.6), on both sides.
+Linkage pendulum() {
+  Linkage l;
+  l.bodies = {"rod"};
+  l.driver = "rod";
+  l.pivots = {{{"ground", "rod"}, {0.1, 0.6}}};
+  l.bars = {{.body = "rod", .points = {{0.1, 0.6}, {0.1, 0.2}}, .half_width = 0.5, .thickness = 0.01, .height = 0.02}};
+  l.density = 2700;
+  return l;
+}
+
+Linkage weighted_four_bar() {
+  Linkage l = four_bar(0.2, {0.45, 0.4}, 0.5);
+  l.masses = {{"crank", 2, {0, 0.1}, 0.01}, {"coupler", 3, {0.2, 0.35}, 0.05}, {"rocker", 1, {0.5, 0.2}, 0.02}};
+  return l;
+}
+
+}  // namespace
+
+TEST(inertia, a_rod_weighs_what_its_formula_says) {
+  const auto i = checked(inertias(pendulum()));
+  const double mass = 2 * 2700 * 0.4 * 0.01 * 0.02;
+  EXPECT_NEAR(i[0].mass, mass, 1e-9);
+  EXPECT_LT((i[0].centre - Vector2d(0.1, 0.4)).norm(), 1e-9);
+  EXPECT_NEAR(i[0].moment, mass * (0.4 * 0.4 + 0.02 * 0.02) / 12, 1e-9);
+  Linkage more = pendulum();
+  more.density = 0;
+  EXPECT_EQ(codes(inertias(more)), "no_mass");
+  more.masses = {{"rod", 2, {0.1, 0.3}, 0.5}};
+  EXPECT_NEAR(checked(inertias(more))[0].moment, 0.5, 1e-12);
+  more.masses[0].body = "rode";
+  EXPECT_EQ(codes(inertias(more)), "unknown_body");
+}
+
+TEST(inertia, a_pendulum_swings_with_its_period_and_keeps_its_energy) {
+  Dynamics dynamics = checked(Dynamics::make(pendulum(), 9.81));
+  const double arm = 0.2, per_mass = (0.4 * 0.4 + 0.02 * 0.02) / 12 + arm * arm;
+  const Reduced still = checked(dynamics.at(0.3));
+  EXPECT_NEAR(still.inertia, dynamics.inertias()[0].mass * per_mass, 1e-9);
+  EXPECT_NEAR(still.weight, -dynamics.inertias()[0].mass * 9.81 * arm * std::sin(0.3), 1e-7);
+  const double omega = std::sqrt(9.81 * arm / per_mass);
+  // Of small swings; to the second order of the amplitude.
+  const double amplitude = 0.02, period = 2 * M_PI / omega * (1 + amplitude * amplitude / 16);
+  const DriverState after = checked(dynamics.advance({amplitude, 0}, 0, 3 * period, [](double, const DriverState&) { return 0.0; }));
+  EXPECT_NEAR(after.angle, amplitude, 1e-9);
+  EXPECT_NEAR(after.rate, 0, 1e-6);
+}
+
+TEST(inertia, a_swinging_linkage_keeps_its_energy) {
+  Dynamics dynamics = checked(Dynamics::make(weighted_four_bar(), 9.81));
+  const auto energy = [&](const DriverState& s) {
+    const Reduced r = checked(dynamics.at(s.angle));
+    return 0.5 * r.inertia * s.rate * s.rate + r.height_energy;
+  };
+  // Against the exact values between the nodes of the table.
+  const auto exact = reduce(checked(follow(weighted_four_bar(), {0.4321}))[0], dynamics.inertias(), 9.81), read = checked(dynamics.at(0.4321));
+  EXPECT_NEAR(read.inertia, exact.inertia, 1e-8);
+  EXPECT_NEAR(read.inertia_slope, exact.inertia_slope, 1e-5);
+  EXPECT_NEAR(read.weight, exact.weight, 1e-5);
+  DriverState s{0, 3};
+  const double start = energy(s);
+  for (int i = 0; i < 20; ++i) {
+    s = checked(dynamics.advance(s, 0.01 * i, 0.01 * (i + 1), [](double, const DriverState&) { return 0.0; }));
+    EXPECT_NEAR(energy(s), start, 1e-8 * std::abs(start));
+  }
+  EXPECT_GT(std::abs(s.angle), 0.1);
+  Linkage locks = four_bar(0.5, {0.3, 0.5}, 0.3);
+  locks.masses = {{"crank", 2, {0, 0.1}, 0.01}};
+  EXPECT_EQ(codes(checked(Dynamics::make(locks, 9.81)).advance({0, 0}, 0, 60, [](double, const DriverState&) { return -100.0; })), "dead_point");
+}
+
+TEST(inertia, the_motion_of_an_angle_is_its_own_derivative) {
+  const std::vector<double> times{0, 1, 3}, angles{0, 2, 1};
+  for (const Profile profile : {Profile::smooth, Profile::straight}) {
+    for (const double t : {-1.0, 0.3, 1.7, 4.0}) {
+      const AngleMotion m = angle_motion(times, angles, profile, t), a = angle_motion(times, angles, profile, t - 1e-5), b = angle_motion(times, angles, profile, t + 1e-5);
+      EXPECT_EQ(m.angle, angle_at(times, angles, profile, t));
+      EXPECT_NEAR(m.rate, (b.angle - a.angle) / 2e-5, 1e-8);
+      EXPECT_NEAR(m.acceleration, (b.rate - a.rate) / 2e-5, 1e-8);
+    }
+  }
 }

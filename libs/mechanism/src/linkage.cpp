@@ -102,6 +102,7 @@ Issues validate(const Linkage& linkage) {
     check(linkage.bows[i].body, fmt::format("bows[{}]", i));
     if (!bows.insert(linkage.bows[i].name).second) issues.push_back(Issue{"duplicate", {.item = fmt::format("bows[{}]", i)}, fmt::format("a bow '{}' is there already", linkage.bows[i].name), "give each bow a name of its own"});
   }
+  for (std::size_t i = 0; i < linkage.masses.size(); ++i) check(linkage.masses[i].body, fmt::format("masses[{}]", i));
   const int freedoms = 3 * static_cast<int>(linkage.bodies.size()) - 2 * static_cast<int>(linkage.pivots.size());
   if (issues.empty() && freedoms != 1) {
     issues.push_back(Issue{"not_one_freedom", {.item = "pivots"}, fmt::format("{} bodies with {} pivots have {} degrees of freedom, not one", linkage.bodies.size(), linkage.pivots.size(), freedoms),
@@ -110,8 +111,47 @@ Issues validate(const Linkage& linkage) {
   return issues;
 }
 
-Result<std::vector<Configuration>> follow(const Linkage& linkage, const std::vector<double>& angles) {
+struct Walk::State {
+  std::string driver;
+  Vector2d middle = Vector2d::Zero();
+  double size = 1;
+  std::vector<Joint> joints;
+  int driver_index = 0, bodies = 0;
+  VectorXd drive, q, rate;
+  double at = 0, conditioning = 0;
+
+  System system() const { return {joints, driver_index, bodies}; }
+
+  /// Rates and conditioning at q; false at a dead point.
+  bool look() {
+    const MatrixXd j = system().jacobian(q);
+    const Eigen::JacobiSVD<MatrixXd> svd(j);
+    const auto& s = svd.singularValues();
+    conditioning = s[s.size() - 1] / s[0];
+    if (!(conditioning > kSingular)) return false;
+    rate = j.partialPivLu().solve(drive);
+    return true;
+  }
+
+  Issue dead(double wanted) const {
+    return {"dead_point", {.item = driver}, fmt::format("the linkage locks or branches at {:.1f} deg of its driver, on the way to {:.1f} deg", degrees(at), degrees(wanted)),
+            "shorten the motion, or move the pivots so that no three of a loop come into line"};
+  }
+};
+
+Walk::Walk(std::unique_ptr<State> state) : state_(std::move(state)) {}
+Walk::Walk(const Walk& other) : state_(std::make_unique<State>(*other.state_)) {}
+Walk& Walk::operator=(const Walk& other) {
+  *state_ = *other.state_;
+  return *this;
+}
+Walk::Walk(Walk&&) noexcept = default;
+Walk& Walk::operator=(Walk&&) noexcept = default;
+Walk::~Walk() = default;
+
+Result<Walk> Walk::begin(const Linkage& linkage) {
   if (Issues issues = validate(linkage); !issues.empty()) return issues;
+  auto state = std::make_unique<State>();
   // About the middle of the pivots and in units of their extent, so that the figures do not depend on where the car stands.
   Vector2d low = Vector2d::Constant(1e300), high = -low;
   for (const Pivot& pivot : linkage.pivots) {
@@ -119,70 +159,87 @@ Result<std::vector<Configuration>> follow(const Linkage& linkage, const std::vec
     low = low.cwiseMin(p);
     high = high.cwiseMax(p);
   }
-  const Vector2d middle = 0.5 * (low + high);
-  const double size = std::max((high - low).norm(), 1e-6);
-  std::vector<Joint> joints;
+  state->driver = linkage.driver;
+  state->middle = 0.5 * (low + high);
+  state->size = std::max((high - low).norm(), 1e-6);
   for (const Pivot& pivot : linkage.pivots) {
-    joints.push_back({index_of(linkage, pivot.bodies[0]), index_of(linkage, pivot.bodies[1]), (Vector2d(pivot.at[0], pivot.at[1]) - middle) / size});
+    state->joints.push_back({index_of(linkage, pivot.bodies[0]), index_of(linkage, pivot.bodies[1]), (Vector2d(pivot.at[0], pivot.at[1]) - state->middle) / state->size});
   }
-  const int bodies = static_cast<int>(linkage.bodies.size());
-  const System system{joints, index_of(linkage, linkage.driver), bodies};
-  VectorXd drive = VectorXd::Zero(3 * bodies);
-  drive[3 * bodies - 1] = 1;  // as many equations as unknowns
+  state->bodies = static_cast<int>(linkage.bodies.size());
+  state->driver_index = index_of(linkage, linkage.driver);
+  state->drive = VectorXd::Zero(3 * state->bodies);
+  state->drive[3 * state->bodies - 1] = 1;  // as many equations as unknowns
+  state->q = VectorXd::Zero(3 * state->bodies);
+  if (!state->look()) return state->dead(0);
+  return Walk(std::move(state));
+}
 
-  VectorXd q = VectorXd::Zero(3 * bodies), rate;
-  double at = 0, conditioning = 0;
-  // Rates and conditioning at q; false at a dead point.
-  const auto look = [&] {
-    const MatrixXd j = system.jacobian(q);
-    const Eigen::JacobiSVD<MatrixXd> svd(j);
-    const auto& s = svd.singularValues();
-    conditioning = s[s.size() - 1] / s[0];
-    if (!(conditioning > kSingular)) return false;
-    rate = j.partialPivLu().solve(drive);
-    return true;
-  };
-  const auto dead = [&](double wanted) {
-    return Issue{"dead_point", {.item = linkage.driver}, fmt::format("the linkage locks or branches at {:.1f} deg of its driver, on the way to {:.1f} deg", degrees(at), degrees(wanted)),
-                 "shorten the motion, or move the pivots so that no three of a loop come into line"};
-  };
-  if (!look()) return dead(angles.empty() ? 0 : angles.front());
+Result<Configuration> Walk::to(double wanted) {
+  State& s = *state_;
+  const System system = s.system();
+  const int steps = std::max(1, static_cast<int>(std::ceil(std::abs(wanted - s.at) / kStep)));
+  const double start = s.at;
+  for (int i = 1; i <= steps; ++i) {
+    const double next = start + (wanted - start) * i / steps;
+    VectorXd trial = s.q + (next - s.at) * s.rate;
+    bool closed = false;
+    for (int round = 0; round < 20 && !closed; ++round) {
+      const VectorXd r = system.residual(trial, next);
+      closed = r.cwiseAbs().maxCoeff() <= kClosure;
+      if (!closed) trial -= system.jacobian(trial).partialPivLu().solve(r);
+      if (!trial.allFinite()) break;
+    }
+    // A correction that is large beside the step has gone over to another branch.
+    const double step = std::max(1e-9, std::abs(next - s.at)) * std::max(1.0, s.rate.norm());
+    if (!closed || (trial - s.q).norm() > 3 * step + 1e-9) return s.dead(wanted);
+    const State before = s;
+    s.q = trial;
+    s.at = next;
+    if (!s.look()) {
+      const Issue dead = s.dead(wanted);
+      s = before;
+      return dead;
+    }
+  }
+  // The closure equations twice derived: J q'' = - J' q'.
+  VectorXd bend = VectorXd::Zero(s.drive.size());
+  for (std::size_t k = 0; k < s.joints.size(); ++k) {
+    for (const auto& [body, sign] : {std::pair{s.joints[k].a, 1.0}, std::pair{s.joints[k].b, -1.0}}) {
+      if (body == kGround) continue;
+      const double turn = s.rate[3 * body + 2];
+      bend.segment<2>(2 * static_cast<Eigen::Index>(k)) += sign * turn * turn * turned(s.q[3 * body + 2], s.joints[k].at);
+    }
+  }
+  const VectorXd curvature = system.jacobian(s.q).partialPivLu().solve(bend);
+  Configuration c;
+  c.driver = wanted;
+  c.conditioning = s.conditioning;
+  c.closure = s.size * system.residual(s.q, wanted).head(2 * static_cast<Eigen::Index>(s.joints.size())).cwiseAbs().maxCoeff();
+  for (int b = 0; b < s.bodies; ++b) {
+    Pose pose, change, bent;
+    pose.angle = s.q[3 * b + 2];
+    change.angle = s.rate[3 * b + 2];
+    bent.angle = curvature[3 * b + 2];
+    // p = middle + size p'; middle + size (s + R p') = (middle + size s - R middle) + R p
+    const Vector2d arm = turned(pose.angle, s.middle);
+    pose.shift = s.middle + s.size * s.q.segment<2>(3 * b) - arm;
+    change.shift = s.size * s.rate.segment<2>(3 * b) - change.angle * square_to(arm);
+    bent.shift = s.size * curvature.segment<2>(3 * b) - bent.angle * square_to(arm) + change.angle * change.angle * arm;
+    c.poses.push_back(pose);
+    c.rates.push_back(change);
+    c.curvatures.push_back(bent);
+  }
+  return c;
+}
+
+Result<std::vector<Configuration>> follow(const Linkage& linkage, const std::vector<double>& angles) {
+  auto walk = Walk::begin(linkage);
+  if (!walk) return walk.issues();
   std::vector<Configuration> result;
   for (const double wanted : angles) {
-    const int steps = std::max(1, static_cast<int>(std::ceil(std::abs(wanted - at) / kStep)));
-    const double start = at;
-    for (int i = 1; i <= steps; ++i) {
-      const double next = start + (wanted - start) * i / steps;
-      VectorXd trial = q + (next - at) * rate;
-      bool closed = false;
-      for (int round = 0; round < 20 && !closed; ++round) {
-        const VectorXd r = system.residual(trial, next);
-        closed = r.cwiseAbs().maxCoeff() <= kClosure;
-        if (!closed) trial -= system.jacobian(trial).partialPivLu().solve(r);
-        if (!trial.allFinite()) break;
-      }
-      // A correction that is large beside the step has gone over to another branch.
-      const double step = std::max(1e-9, std::abs(next - at)) * std::max(1.0, rate.norm());
-      if (!closed || (trial - q).norm() > 3 * step + 1e-9) return dead(wanted);
-      q = trial;
-      at = next;
-      if (!look()) return dead(wanted);
-    }
-    Configuration c;
-    c.driver = wanted;
-    c.conditioning = conditioning;
-    c.closure = size * system.residual(q, wanted).head(2 * static_cast<Eigen::Index>(joints.size())).cwiseAbs().maxCoeff();
-    for (int b = 0; b < bodies; ++b) {
-      Pose pose, change;
-      pose.angle = q[3 * b + 2];
-      change.angle = rate[3 * b + 2];
-      // p = middle + size p'; middle + size (s + R p') = (middle + size s - R middle) + R p
-      pose.shift = middle + size * q.segment<2>(3 * b) - turned(pose.angle, middle);
-      change.shift = size * rate.segment<2>(3 * b) - change.angle * square_to(turned(pose.angle, middle));
-      c.poses.push_back(pose);
-      c.rates.push_back(change);
-    }
-    result.push_back(std::move(c));
+    auto c = walk->to(wanted);
+    if (!c) return c.issues();
+    result.push_back(std::move(*c));
   }
   return result;
 }

@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -71,18 +72,36 @@ struct Bow {
   }
 };
 
+/// Mass that a body has besides its bars and bows.
+struct AddedMass {
+  std::string body;
+  double mass = 0;                 ///< [kg]
+  std::array<double, 2> at{0, 0};  ///< z, y of its centre in the drawing [m]
+  double moment = 0;               ///< of inertia about its centre, for turning in the drawing's plane [kg m2]
+  static void describe(auto& f) {
+    f(&AddedMass::body, {.key = "body", .doc = "that it is a part of", .required = true});
+    f(&AddedMass::mass, {.key = "mass", .doc = "on both sides together", .unit = "kg", .min = 0, .max = 1e4, .required = true});
+    f(&AddedMass::at, {.key = "at", .doc = "its centre in the drawing: forward (z) and up (y)", .unit = "m", .required = true});
+    f(&AddedMass::moment, {.key = "moment", .doc = "moment of inertia about its centre, for turning in the drawing's plane", .unit = "kg*m2", .min = 0, .max = 1e4});
+  }
+};
+
 struct Linkage {
   std::vector<std::string> bodies;  ///< without ground
   std::vector<Pivot> pivots;
   std::string driver;  ///< the body whose angle says where the linkage is
   std::vector<Bar> bars;
   std::vector<Bow> bows;
+  double density = 2700;           ///< of bars and bows [kg/m3]
+  std::vector<AddedMass> masses;
   static void describe(auto& f) {
     f(&Linkage::bodies, {.key = "bodies", .doc = "names of the moving bodies", .required = true});
     f(&Linkage::pivots, {.key = "pivots", .doc = "points about which two bodies turn, in the drawn position", .required = true});
     f(&Linkage::driver, {.key = "driver", .doc = "the body whose angle from the drawn position the motion prescribes", .required = true});
     f(&Linkage::bars, {.key = "bars", .doc = "rods in the plane of the drawing, on both sides"});
     f(&Linkage::bows, {.key = "bows", .doc = "arches from side to side"});
+    f(&Linkage::density, {.key = "density", .doc = "of bars and bows, which are solid; 0: they weigh nothing", .unit = "kg/m3", .min = 0, .max = 3e4});
+    f(&Linkage::masses, {.key = "masses", .doc = "what the bodies weigh besides"});
   }
 };
 
@@ -101,12 +120,32 @@ struct Configuration {
   double driver = 0;               ///< [rad]
   std::vector<Pose> poses;         ///< of the bodies, in their order
   std::vector<Pose> rates;         ///< their derivatives by the driver's angle [m/rad, 1]
+  std::vector<Pose> curvatures;    ///< their second derivatives [m/rad2, 1/rad]
   double closure = 0;              ///< largest distance of a pivot's point on its two bodies [m]
   double conditioning = 0;         ///< smallest over largest singular value of the closure equations (lengths in units of the drawing's size)
 };
 
-/// Follows the linkage along its driver's angles, from the drawn position on, in steps of one degree at most: prediction along the
-/// rates, correction by Newton's method on the loop closures.
+/// A linkage that is led along its driver's angle, from the drawn position on. A copy is a state to come back to.
+class Walk {
+ public:
+  /// error  what validate finds; "dead_point" where the drawn position is one
+  static Result<Walk> begin(const Linkage& linkage);
+  /// Leads it there in steps of one degree at most: prediction along the rates, correction by Newton's method on the loop closures.
+  /// error  "dead_point" where the linkage locks or branches before the angle is reached; it then stands before that point
+  Result<Configuration> to(double angle);
+  Walk(const Walk&);
+  Walk& operator=(const Walk&);
+  Walk(Walk&&) noexcept;
+  Walk& operator=(Walk&&) noexcept;
+  ~Walk();
+
+ private:
+  struct State;
+  explicit Walk(std::unique_ptr<State> state);
+  std::unique_ptr<State> state_;
+};
+
+/// Follows the linkage along its driver's angles, as Walk does.
 /// angles  [rad], in any order; each is reached from the one before it
 /// ret     one configuration an angle, closures below 1e-12 of the drawing's size
 /// error   what validate finds; "dead_point" where the linkage locks or branches before the angle is reached, with that angle
