@@ -46,7 +46,7 @@ Welcome welcome() {
   Welcome w;
   w.program = "cloth";
   w.bodies = {"rail"};
-  w.least_step = 1e-4;
+  w.longest_step = 0.01;
   w.wrenches.resize(2);
   return w;
 }

@@ -43,9 +43,12 @@ struct Channel::Socket {
   std::vector<int> closed;      // connections that ended before anybody spoke
 
   ~Socket() {
+    // In this order: an event without anybody to take it would block the context for ever.
+    if (socket) zmq_socket_monitor(socket, nullptr, 0);
     if (monitor) zmq_close(monitor);
     if (socket) {
-      zmq_socket_monitor(socket, nullptr, 0);
+      const int none = 0;
+      if (gone || !(connected || peer)) zmq_setsockopt(socket, ZMQ_LINGER, &none, sizeof none);
       zmq_close(socket);
     }
     if (context) zmq_ctx_term(context);
@@ -65,8 +68,6 @@ struct Channel::Socket {
     set(ZMQ_HEARTBEAT_IVL, 2000);
     set(ZMQ_HEARTBEAT_TIMEOUT, 20000);
     set(ZMQ_RECONNECT_IVL, 50);
-    // What is sent waits until somebody is there.
-    set(ZMQ_IMMEDIATE, 1);
     zmq_setsockopt(socket, ZMQ_MAXMSGSIZE, &largest, sizeof largest);
     static std::atomic<int> count{0};
     const std::string events = fmt::format("inproc://events-{}", count++);

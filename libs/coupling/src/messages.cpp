@@ -185,7 +185,7 @@ std::string encode(const Message& message) {
     w.reals("masses", m->masses).text("model", m->model).real("start", m->start).real("end", m->end);
     w.text("steps", m->steps == Steps::fixed ? "fixed" : "variable").real("time_step", m->time_step).states(m->states);
   } else if (const auto* m = std::get_if<Welcome>(&message)) {
-    w.integer("version", m->version).text("program", m->program).texts("bodies", m->bodies).real("least_step", m->least_step).wrenches(m->wrenches);
+    w.integer("version", m->version).text("program", m->program).texts("bodies", m->bodies).real("longest_step", m->longest_step).wrenches(m->wrenches);
   } else if (const auto* m = std::get_if<Step>(&message)) {
     w.integer("number", m->number).real("from", m->from).real("to", m->to).states(m->states);
   } else if (const auto* m = std::get_if<Reached>(&message)) {
@@ -260,7 +260,7 @@ Result<Message> decode(std::string_view text) {
     Welcome m;
     r.text("program", m.program);
     r.texts("bodies", m.bodies);
-    r.real("least_step", m.least_step);
+    r.real("longest_step", m.longest_step);
     r.wrenches(m.wrenches);
     return finish(r, m);
   }

@@ -12,7 +12,6 @@ using Eigen::Vector3d;
 namespace {
 
 constexpr double spacing = 0.5 * M_PI / 180;  // of the angles at which the linkage is looked at [rad]
-constexpr double piece = 5e-4;                // of integration at most [s]
 
 Vector2d turned(double angle, const Vector2d& p) { return {std::cos(angle) * p.x() - std::sin(angle) * p.y(), std::sin(angle) * p.x() + std::cos(angle) * p.y()}; }
 Vector2d square_to(const Vector2d& p) { return {-p.y(), p.x()}; }
@@ -123,8 +122,8 @@ Result<Reduced> Dynamics::at(double angle) {
   return Reduced{inertia.value, inertia.slope, -height.slope, height.value};
 }
 
-Result<DriverState> Dynamics::advance(DriverState state, double from, double to, const Torque& torque) {
-  const int pieces = std::max(1, static_cast<int>(std::ceil((to - from) / piece - 1e-9)));
+Result<DriverState> Dynamics::advance(DriverState state, double from, double to, const Torque& torque, double longest_piece) {
+  const int pieces = std::max(1, static_cast<int>(std::ceil((to - from) / longest_piece - 1e-9)));
   const double h = (to - from) / pieces;
   Issues issues;
   const auto slope = [&](double time, const DriverState& s) -> DriverState {

@@ -46,8 +46,8 @@ struct Hello {
 struct Welcome {
   int version = protocol_version;
   std::string program;
-  std::vector<std::string> bodies;    ///< those that it touches or hangs on
-  double least_step = 0;              ///< shorter ones are refused [s]
+  std::vector<std::string> bodies;    ///< those that it knows; the others' states do not matter to it
+  double longest_step = 0;            ///< longer ones are refused; 0: none is too long [s]
   std::vector<Wrench> wrenches;       ///< at the start
 };
 /// Master: go on to a time, at which the bodies are so.

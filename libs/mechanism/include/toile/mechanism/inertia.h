@@ -43,9 +43,9 @@ class Dynamics {
   Result<Reduced> at(double angle);
   /// Torque on the driver, besides gravity, at a time, angle and rate [N m].
   using Torque = std::function<double(double time, const DriverState& state)>;
-  /// Fourth order Runge-Kutta in pieces of half a millisecond at most.
+  /// Fourth order Runge-Kutta in pieces of half a millisecond at most, or shorter ones for torques that are stiff.
   /// error  "dead_point"; "not_finite"
-  Result<DriverState> advance(DriverState state, double from, double to, const Torque& torque);
+  Result<DriverState> advance(DriverState state, double from, double to, const Torque& torque, double longest_piece = 5e-4);
   const std::vector<Inertia>& inertias() const { return inertias_; }
 
  private:
