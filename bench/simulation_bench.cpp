@@ -68,7 +68,7 @@ Case soft_top(const fabric::Card& card) {
     turns += fmt::format("{}{} rad", i ? ", " : "", -swing(t));
   }
   c.simulation = fmt::format(
-      "mode: motion\nduration: 1 s\nfriction: 0.3\nsupport_friction: 0.3\nconstraints:\n"
+      "mode: motion\nduration: 1 s\nnewton_accuracy: 10 mm\nfriction: 0.3\nsupport_friction: 0.3\nconstraints:\n"
       "  - {{name: header, on: [top.left], kind: pin}}\n"
       "  - {{name: bow, on: [top.right], kind: drive, times: [{}], turn: [{}], axis: [0, 0, 1], centre: [650 mm, 0 m, 0 m]}}\n",
       times, turns);
@@ -177,7 +177,7 @@ int main(int argc, char** argv) {
   const auto card = text ? io::read_record<fabric::Card>(*text, card_file) : Result<fabric::Card>(text.issues());
   if (!card) return fmt::print(stderr, "{}\n", to_string(card.issues().front())), 3;
 
-  const std::string falling = "mode: motion\nduration: 1 s\nfriction: 0.3\nsupport_friction: 0.3\n", resting = "friction: 0.3\nsupport_friction: 0.3\n";
+  const std::string falling = "mode: motion\nduration: 1 s\nnewton_accuracy: 10 mm\nfriction: 0.3\nsupport_friction: 0.3\n", resting = "friction: 0.3\nsupport_friction: 0.3\n";
   const BlenderPreset quality_a{"Q", 10, 5, 0.008, 0.004, 0.002}, coarse_a{"Q", 10, 5, 0.008, 0.004, 0.004};
   std::vector<Case> cases;
   const auto wanted = [&](const std::string& name) { return only.empty() || name.find(only) != std::string::npos; };

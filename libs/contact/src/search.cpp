@@ -97,6 +97,15 @@ struct Search::Impl {
     std::vector<std::array<std::vector<Near>, 5>> chunks;
   };
   NearList near_self, near_support;
+
+  // Pairs whose boxes overlapped, with the boxes of all cloth nodes: complete while every node stays in its box, whatever happens there. The
+  // iterations of one step look at nearly the same place again and again; boxes with a reserve save them the hierarchies.
+  struct PairStore {
+    bool valid = false;
+    std::vector<Box> box;  // of each local cloth vertex
+    std::vector<std::array<std::vector<Candidate>, 5>> chunks;
+  };
+  PairStore stored_self, stored_support;
   double slack = 0;  // what a list reaches beyond the radius asked for [m]
 
   // steps
@@ -194,6 +203,73 @@ struct Search::Impl {
           }
         });
       }
+    });
+  }
+  static bool holds(const PairStore& store, const std::vector<Vec>& x0, const std::vector<Vec>& x1, double grow) {
+    if (!store.valid || store.box.size() != x0.size()) return false;
+    const int outside = parallel_reduce(
+        x0.size(), 2048, 0,
+        [&](std::size_t begin, std::size_t end) {
+          for (std::size_t i = begin; i < end; ++i) {
+            if (!contains(store.box[i], point_box(x0[i], x1[i], grow))) return 1;
+          }
+          return 0;
+        },
+        [](int p, int q) { return p + q; });
+    return outside == 0;
+  }
+  // How much a motion may be worth a store: beyond, its boxes would hold too much of the neighbourhood.
+  bool short_way(const std::vector<Vec>& x0, const std::vector<Vec>& x1) const { return &x0 == &x1 || farthest(x1, x0, Vec::Zero()) < slack; }
+
+  // Calls body for all pairs of the cloth with itself (of the cloth with the support) that can come within twice `grow` (within `grow`) on the way
+  // from x0 to x1, and for some others.
+  template <class Body>
+  void self_pairs_on_way(const std::vector<Vec>& x0, const std::vector<Vec>& x1, double grow, const Body& body) {
+    if (holds(stored_self, x0, x1, grow)) return for_stored(stored_self, body);
+    if (!short_way(x0, x1)) {
+      self_boxes.refit(cloth_tree, x0, x1, grow);
+      return self_pairs(body);
+    }
+    self_boxes.refit(cloth_tree, x0, x1, grow + slack);
+    start_store(stored_self, self_boxes);
+    self_pairs([&]<Kind kind>(Chunk& chunk, const Candidate& c) { keep<kind>(stored_self, chunk, c); });
+    for_stored(stored_self, body);
+  }
+  template <class Body>
+  void support_pairs_on_way(const std::vector<Vec>& x0, const std::vector<Vec>& x1, double grow, const Body& body) {
+    if (holds(stored_support, x0, x1, grow)) return for_stored(stored_support, body);
+    if (!short_way(x0, x1)) {
+      against_boxes.refit(cloth_tree, x0, x1, grow);
+      return support_pairs(body);
+    }
+    against_boxes.refit(cloth_tree, x0, x1, grow + slack);
+    start_store(stored_support, against_boxes);
+    support_pairs([&]<Kind kind>(Chunk& chunk, const Candidate& c) { keep<kind>(stored_support, chunk, c); });
+    for_stored(stored_support, body);
+  }
+  void start_store(PairStore& store, const Boxes& boxes) {
+    store.valid = true;
+    store.box = boxes.vertex;
+    store.chunks.resize(chunks.size());
+    for (auto& kinds : store.chunks) {
+      for (auto& part : kinds) part.clear();
+    }
+  }
+  template <Kind kind>
+  void keep(PairStore& store, const Chunk& chunk, const Candidate& c) const {
+    store.chunks[static_cast<std::size_t>(&chunk - chunks.data())][static_cast<std::size_t>(kind)].push_back(c);
+  }
+  template <class Body>
+  void for_stored(const PairStore& store, const Body& body) {
+    parallel_for(chunks.size(), 1, [&](std::size_t i) {
+      const auto run = [&]<Kind kind>() {
+        for (const Candidate& c : store.chunks[i][static_cast<std::size_t>(kind)]) body.template operator()<kind>(chunks[i], c);
+      };
+      run.template operator()<Kind::vertex_face>();
+      run.template operator()<Kind::edge_edge>();
+      run.template operator()<Kind::vertex_support_face>();
+      run.template operator()<Kind::support_vertex_face>();
+      run.template operator()<Kind::edge_support_edge>();
     });
   }
   void size_chunks() { chunks.resize((cloth_tree.leaf_count() + leaf_grain - 1) / leaf_grain); }
@@ -444,8 +520,7 @@ struct Search::Impl {
       self_boxes.refit(cloth_tree, x, x, 0.5 * near_self.reach);
       self_pairs([&]<Kind kind>(Chunk& chunk, const Candidate& c) { test_and_list<kind>(near_self, chunk, c, radius); });
     } else {
-      self_boxes.refit(cloth_tree, x, x, 0.5 * radius);
-      self_pairs([&]<Kind kind>(Chunk& chunk, const Candidate& c) { test_near<kind>(chunk, c, radius); });
+      self_pairs_on_way(x, x, 0.5 * radius, [&]<Kind kind>(Chunk& chunk, const Candidate& c) { test_near<kind>(chunk, c, radius); });
     }
   }
   void find_near_support(const Points3& support_x, double radius) {
@@ -469,8 +544,7 @@ struct Search::Impl {
       against_boxes.refit(cloth_tree, x, x, list.reach);
       support_pairs([&]<Kind kind>(Chunk& chunk, const Candidate& c) { test_and_list<kind>(list, chunk, c, radius); });
     } else {
-      against_boxes.refit(cloth_tree, x, x, radius);
-      support_pairs([&]<Kind kind>(Chunk& chunk, const Candidate& c) { test_near<kind>(chunk, c, radius); });
+      support_pairs_on_way(x, x, radius, [&]<Kind kind>(Chunk& chunk, const Candidate& c) { test_near<kind>(chunk, c, radius); });
     }
   }
 
@@ -502,6 +576,7 @@ struct Search::Impl {
     support_from.load(support_tree, s0);
     support_to.load(support_tree, s1);
     support_boxes.refit(support_tree, support_from.x, support_to.x, 0);
+    stored_support.valid = false;
   }
 
   // ---------------------------------------------------------------- steps
@@ -544,16 +619,14 @@ struct Search::Impl {
     if (const auto distance = self_list_distance(cloth_from.x, cloth_to.x, 1.2 * o.self_separation)) {
       for_list(near_self, *distance, [&]<Kind kind>(Chunk& chunk, const Candidate& c) { add_candidate<kind>(chunk, c, o.self_separation); });
     } else {
-      self_boxes.refit(cloth_tree, cloth_from.x, cloth_to.x, 0.6 * o.self_separation);
-      self_pairs([&]<Kind kind>(Chunk& chunk, const Candidate& c) { add_candidate<kind>(chunk, c, o.self_separation); });
+      self_pairs_on_way(cloth_from.x, cloth_to.x, 0.6 * o.self_separation, [&]<Kind kind>(Chunk& chunk, const Candidate& c) { add_candidate<kind>(chunk, c, o.self_separation); });
     }
     if (!has_support) return;
     if (const auto distance =
             support_list_distance(cloth_from.x, cloth_to.x, support_from.x, support_to.x, 1.2 * o.support_separation)) {
       for_list(near_support, *distance, [&]<Kind kind>(Chunk& chunk, const Candidate& c) { add_candidate<kind>(chunk, c, o.support_separation); });
     } else {
-      against_boxes.refit(cloth_tree, cloth_from.x, cloth_to.x, 1.2 * o.support_separation);
-      support_pairs([&]<Kind kind>(Chunk& chunk, const Candidate& c) { add_candidate<kind>(chunk, c, o.support_separation); });
+      support_pairs_on_way(cloth_from.x, cloth_to.x, 1.2 * o.support_separation, [&]<Kind kind>(Chunk& chunk, const Candidate& c) { add_candidate<kind>(chunk, c, o.support_separation); });
     }
   }
 

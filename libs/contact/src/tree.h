@@ -27,6 +27,9 @@ inline Box common(const Box& a, const Box& b) { return {_mm_max_ps(a.lo, b.lo), 
 inline bool overlap(const Box& a, const Box& b) {
   return _mm_movemask_ps(_mm_and_ps(_mm_cmple_ps(a.lo, b.hi), _mm_cmple_ps(b.lo, a.hi))) == 15;
 }
+inline bool contains(const Box& outer, const Box& inner) {
+  return _mm_movemask_ps(_mm_and_ps(_mm_cmple_ps(outer.lo, inner.lo), _mm_cmple_ps(inner.hi, outer.hi))) == 15;
+}
 inline Box make_box(const float* lo, const float* hi) { return {_mm_setr_ps(lo[0], lo[1], lo[2], 0), _mm_setr_ps(hi[0], hi[1], hi[2], 0)}; }
 #else
 struct Box {
@@ -45,6 +48,9 @@ inline Box common(const Box& a, const Box& b) {
 }
 inline bool overlap(const Box& a, const Box& b) {
   return a.lo[0] <= b.hi[0] && b.lo[0] <= a.hi[0] && a.lo[1] <= b.hi[1] && b.lo[1] <= a.hi[1] && a.lo[2] <= b.hi[2] && b.lo[2] <= a.hi[2];
+}
+inline bool contains(const Box& outer, const Box& inner) {
+  return outer.lo[0] <= inner.lo[0] && inner.hi[0] <= outer.hi[0] && outer.lo[1] <= inner.lo[1] && inner.hi[1] <= outer.hi[1] && outer.lo[2] <= inner.lo[2] && inner.hi[2] <= outer.hi[2];
 }
 inline Box make_box(const float* lo, const float* hi) { return {{lo[0], lo[1], lo[2]}, {hi[0], hi[1], hi[2]}}; }
 #endif

@@ -12,6 +12,7 @@ namespace toile::dynamics {
 namespace {
 
 constexpr int patch_size = 40;  // nodes; from 30 to 60 the total time is about the same
+constexpr double float_rounding = 1.2e-7;  // of the sum of a few blocks
 
 using Modes = Eigen::Matrix<double, 3, 6>;
 using Block6 = Eigen::Matrix<double, 6, 6>;
@@ -100,6 +101,7 @@ struct CoarseSpace::State {
   std::vector<Double4> arm;                  // from the centre of the patch to the node, over the patch's size; 0 at fixed nodes
   std::vector<char> fixed;
   std::vector<std::vector<Block6>> blocks;   // of the matrix alone, as `next`
+  std::vector<double> rounding;              // of each patch: what single precision leaves uncertain of its stiffness
   std::vector<Eigen::Triplet<double>> triplets;
   Eigen::SparseMatrix<double> matrix;
   Eigen::SimplicialLLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::AMDOrdering<int>> factor;
@@ -139,6 +141,7 @@ void CoarseSpace::State::choose(const BlockMatrix& a) {
   for (std::size_t i = 0; i < n; ++i) patch_node[static_cast<std::size_t>(at[static_cast<std::size_t>(patch[i])]++)] = static_cast<int>(i);
   next.assign(count, {});
   blocks.assign(count, {});
+  rounding.assign(count, 0);
   for (std::size_t p = 0; p < count; ++p) {
     for (int k = patch_start[p]; k < patch_start[p + 1]; ++k) {
       const auto i = static_cast<std::size_t>(patch_node[static_cast<std::size_t>(k)]);
@@ -176,10 +179,13 @@ void CoarseSpace::State::project(const BlockMatrix& a) {
     Columns6 zero;
     for (Double4& column : zero.column) column.setZero();
     std::vector<Columns6> sum(list.size(), zero);
+    double stiffness = 0;
     for (int k = patch_start[p]; k < patch_start[p + 1]; ++k) {
       const int node = patch_node[static_cast<std::size_t>(k)];
       const auto i = static_cast<std::size_t>(node);
       if (fixed[i]) continue;
+      const Block& own_block = a.value[static_cast<std::size_t>(a.diagonal[i])];
+      for (int c = 0; c < 3; ++c) stiffness += static_cast<double>(own_block.column[c][c]);
       std::fill(sum.begin(), sum.end(), zero);
       for (int m = a.row_start[i]; m < a.row_start[i + 1]; ++m) {
         const auto j = static_cast<std::size_t>(a.column[static_cast<std::size_t>(m)]);
@@ -210,6 +216,7 @@ void CoarseSpace::State::project(const BlockMatrix& a) {
         }
       }
     }
+    rounding[p] = float_rounding * stiffness;
   });
 }
 
@@ -251,6 +258,7 @@ CoarseSpace::~CoarseSpace() = default;
 CoarseSpace::CoarseSpace(CoarseSpace&&) noexcept = default;
 CoarseSpace& CoarseSpace::operator=(CoarseSpace&&) noexcept = default;
 int CoarseSpace::patches() const { return state_->patches(); }
+bool CoarseSpace::fits(const BlockMatrix& matrix) const { return state_->patch.size() == static_cast<std::size_t>(matrix.rows()) && !state_->patch.empty(); }
 
 void CoarseSpace::factor(const BlockMatrix& matrix, const std::vector<ContactTerm>& terms, const mesh::Points3& x, const std::vector<char>& fixed) {
   State& s = *state_;
@@ -267,10 +275,12 @@ void CoarseSpace::factor(const BlockMatrix& matrix, const std::vector<ContactTer
   s.matrix.resize(unknowns, unknowns);
   s.matrix.setFromTriplets(s.triplets.begin(), s.triplets.end());
   // A patch of fixed nodes has no motion, one along a line no turn about it, and single precision leaves the matrix only nearly
-  // positive: a small shift mends all three.
+  // positive: a small shift mends all three. Where next to nothing holds a body the stiffnesses of its blocks cancel, and what is left on the
+  // diagonal is their rounding, of either sign: then the rounding is what the shift is measured by.
   s.factor.analyzePattern(s.matrix);
   Eigen::VectorXd diagonal = s.matrix.diagonal();
   const double least = 1e-9 * std::max(diagonal.maxCoeff(), 1e-30);
+  for (int k = 0; k < unknowns; ++k) diagonal[k] = std::max(diagonal[k], s.rounding[static_cast<std::size_t>(k / 6)]);
   for (double shift = 1e-6; ; shift *= 30) {
     for (int k = 0; k < unknowns; ++k) s.matrix.coeffRef(k, k) = diagonal[k] * (1 + shift) + least;
     s.factor.factorize(s.matrix);

@@ -58,7 +58,7 @@ Block product(const Block& a, const Block& b) {
 
 }  // namespace
 
-void LinearSolver::factor(const BlockMatrix& matrix, const std::vector<ContactTerm>& terms, const mesh::Points3& x, const std::vector<char>& fixed) {
+void LinearSolver::factor(const BlockMatrix& matrix, const std::vector<ContactTerm>& terms, const mesh::Points3& x, const std::vector<char>& fixed, Coarse coarse) {
   const auto n = static_cast<std::size_t>(matrix.rows());
   // Terms around each node.
   node_term_start_.assign(n + 1, 0);
@@ -109,7 +109,7 @@ void LinearSolver::factor(const BlockMatrix& matrix, const std::vector<ContactTe
   // indefinite; then the domain is factored anew with a heavier diagonal (Manteuffel's shift).
   parallel_for(domain_start_.size(), 1, [&](std::size_t task) {
     if (task == 0) {
-      coarse_.factor(matrix, terms, x, fixed);
+      if (coarse == Coarse::anew || !coarse_.fits(matrix)) coarse_.factor(matrix, terms, x, fixed);
       return;
     }
     const std::size_t d = task - 1;

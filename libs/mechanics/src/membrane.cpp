@@ -84,17 +84,22 @@ MembraneResponse membrane_response(const fabric::CurvePoint& weft, const fabric:
     e2 = e1.unitOrthogonal();
   }
   const Eigen::Vector3d e3 = e1.cross(e2);
-  const Eigen::Vector2d d1(1, 0), d2(s, c), q(-c, s), y(0, 1);
-  const Eigen::Vector2d p1(0, c), p2 = -c * q;
+  // With the yarns' directions d1 = (1, 0), d2 = (s, c), across them y = (0, 1), q = (-c, s), and the sine's derivatives p1 = (0, c)/l1, p2 = -c q/l2:
+  // weft-weft   slope d1 d1 + force/l1 y y + shear.slope p1 p1 - shear.force/l1 (d1 p1 + p1 d1 + s/l1 y y), warp-warp alike,
+  // weft-warp   shear.slope p1 p2 + shear.force/(l1 l2) (y q) y q
+  const double f1 = shear.force / (l1 * l1), f2 = shear.force / (l2 * l2), f12 = shear.force / (l1 * l2), g12 = shear.slope / (l1 * l2);
+  const double c2 = c * c, s2 = s * s, sc = s * c;
+  const double across1 = weft.force / l1 - f1 * s, across2 = warp.force / l2 - f2 * s, shear2 = shear.slope / (l2 * l2) * c2;
   Eigen::Matrix4d plane;
-  plane.topLeftCorner<2, 2>() = weft.slope * d1 * d1.transpose() + weft.force / l1 * y * y.transpose() +
-                                shear.slope / (l1 * l1) * p1 * p1.transpose() -
-                                shear.force / (l1 * l1) * (d1 * p1.transpose() + p1 * d1.transpose() + s * y * y.transpose());
-  plane.bottomRightCorner<2, 2>() = warp.slope * d2 * d2.transpose() + warp.force / l2 * q * q.transpose() +
-                                    shear.slope / (l2 * l2) * p2 * p2.transpose() -
-                                    shear.force / (l2 * l2) * (d2 * p2.transpose() + p2 * d2.transpose() + s * q * q.transpose());
-  plane.topRightCorner<2, 2>() = shear.slope / (l1 * l2) * p1 * p2.transpose() + shear.force / (l1 * l2) * y.dot(q) * y * q.transpose();
-  plane.bottomLeftCorner<2, 2>() = plane.topRightCorner<2, 2>().transpose();
+  plane(0, 0) = weft.slope;
+  plane(0, 1) = plane(1, 0) = -f1 * c;
+  plane(1, 1) = across1 + shear.slope / (l1 * l1) * c2;
+  plane(2, 2) = warp.slope * s2 + (across2 + shear2) * c2 - 2 * f2 * s * c2;
+  plane(2, 3) = plane(3, 2) = warp.slope * sc - (across2 + shear2) * sc - f2 * c * (c2 - s2);
+  plane(3, 3) = warp.slope * c2 + (across2 + shear2) * s2 + 2 * f2 * c2 * s;
+  plane(0, 2) = plane(2, 0) = plane(0, 3) = plane(3, 0) = 0;
+  plane(1, 2) = plane(2, 1) = g12 * c2 * c - f12 * sc;
+  plane(1, 3) = plane(3, 1) = -g12 * c2 * s + f12 * s2;
   double n11 = weft.force / l1 - shear.force * s / (l1 * l1), n22 = warp.force / l2 - shear.force * s / (l2 * l2), n12 = shear.force / (l1 * l2);
 
   if (curvature == Curvature::positive) {
@@ -113,12 +118,15 @@ MembraneResponse membrane_response(const fabric::CurvePoint& weft, const fabric:
       n12 = 0.5 * (high - low) * sin2;
     }
   }
-  Eigen::Matrix<double, 3, 2> e;
-  e << e1, e2;
-  const Eigen::Matrix3d normal = e3 * e3.transpose();
-  r.weft_weft = e * plane.topLeftCorner<2, 2>() * e.transpose() + n11 * normal;
-  r.warp_warp = e * plane.bottomRightCorner<2, 2>() * e.transpose() + n22 * normal;
-  r.weft_warp = e * plane.topRightCorner<2, 2>() * e.transpose() + n12 * normal;
+  const auto turned = [&](int row, int column, double normal) {
+    Eigen::Matrix3d m;
+    const double a = plane(row, column), b = plane(row, column + 1), d = plane(row + 1, column), h = plane(row + 1, column + 1);
+    for (int k = 0; k < 3; ++k) m.col(k) = (a * e1[k] + b * e2[k]) * e1 + (d * e1[k] + h * e2[k]) * e2 + (normal * e3[k]) * e3;
+    return m;
+  };
+  r.weft_weft = turned(0, 0, n11);
+  r.warp_warp = turned(2, 2, n22);
+  r.weft_warp = turned(0, 2, n12);
   return r;
 }
 

@@ -539,11 +539,15 @@ void evaluate(const Sheet& sheet, const Points3& x, const Points3& link_offset, 
       response.corner_force[f].col(static_cast<Eigen::Index>(k)) = shape.area * (shape.slope_u[k] * r.stress.weft + shape.slope_v[k] * r.stress.warp);
     }
     if (!curvature) return;
+    // Single precision, as the matrix that they go into.
+    const Block weft_weft = Block::from(r.weft_weft), weft_warp = Block::from(r.weft_warp), warp_weft = weft_warp.transposed(), warp_warp = Block::from(r.warp_warp);
     for (std::size_t a = 0; a < 3; ++a) {
+      const double au = shape.area * shape.slope_u[a], av = shape.area * shape.slope_v[a];
       for (std::size_t b = a; b < 3; ++b) {
-        const double au = shape.slope_u[a], av = shape.slope_v[a], bu = shape.slope_u[b], bv = shape.slope_v[b];
-        response.face_blocks[f][static_cast<std::size_t>(block_slot[a][b])] =
-            shape.area * (au * bu * r.weft_weft + au * bv * r.weft_warp + av * bu * r.weft_warp.transpose() + av * bv * r.warp_warp);
+        const Float4 uu = splat(static_cast<float>(au * shape.slope_u[b])), uv = splat(static_cast<float>(au * shape.slope_v[b])),
+                     vu = splat(static_cast<float>(av * shape.slope_u[b])), vv = splat(static_cast<float>(av * shape.slope_v[b]));
+        Block& block = response.face_blocks[f][static_cast<std::size_t>(block_slot[a][b])];
+        for (int c = 0; c < 3; ++c) block.column[c] = uu * weft_weft.column[c] + uv * weft_warp.column[c] + (vu * warp_weft.column[c] + vv * warp_warp.column[c]);
       }
     }
   };
@@ -671,29 +675,34 @@ void evaluate(const Sheet& sheet, const Points3& x, const Points3& link_offset, 
     matrix.column = sheet.column;
     matrix.diagonal = sheet.diagonal;
     matrix.value.resize(sheet.column.size());
+    response.constant_blocks_stand = false;
   }
+  const bool all = !response.constant_blocks_stand || !sheet.springs.empty();
   parallel_for(static_cast<std::size_t>(sheet.node_count), grain / 4, [&](std::size_t i) {
     for (int k = sheet.row_start[i]; k < sheet.row_start[i + 1]; ++k) {
       const auto slot = static_cast<std::size_t>(k);
-      Eigen::Matrix3d sum = sheet.constant_part[slot] * Eigen::Matrix3d::Identity();
-      for (int p = sheet.block_part_start[slot]; p < sheet.block_part_start[slot + 1]; ++p) {
+      const int part_end = sheet.block_part_start[slot + 1], pair_end = sheet.block_pair_start[slot + 1];
+      if (sheet.block_part_start[slot] == part_end && sheet.block_pair_start[slot] == pair_end && !all && k != sheet.diagonal[i]) continue;
+      Block sum = Block::identity(static_cast<float>(sheet.constant_part[slot]));
+      for (int p = sheet.block_part_start[slot]; p < part_end; ++p) {
         const int item = sheet.block_part[static_cast<std::size_t>(p)], a = item % 9 / 3, b = item % 3;
-        const Eigen::Matrix3d& block = response.face_blocks[static_cast<std::size_t>(item / 9)][static_cast<std::size_t>(block_slot[static_cast<std::size_t>(a)][static_cast<std::size_t>(b)])];
-        if (a <= b) {
-          sum += block;
-        } else {
-          sum += block.transpose();
+        const Block& block = response.face_blocks[static_cast<std::size_t>(item / 9)][static_cast<std::size_t>(block_slot[static_cast<std::size_t>(a)][static_cast<std::size_t>(b)])];
+        sum += a <= b ? block : block.transposed();
+      }
+      if (sheet.block_pair_start[slot] < pair_end) {
+        Eigen::Matrix3d pairs = Eigen::Matrix3d::Zero();
+        for (int p = sheet.block_pair_start[slot]; p < pair_end; ++p) {
+          const auto [first, second] = sheet.block_pair[static_cast<std::size_t>(p)];
+          const double slope = response.element_slope[static_cast<std::size_t>(sheet.entry_element[static_cast<std::size_t>(first)])];
+          if (slope == 0) continue;  // a slider that slides
+          pairs += slope * response.entry_gradient[static_cast<std::size_t>(first)] * response.entry_gradient[static_cast<std::size_t>(second)].transpose();
         }
+        sum += Block::from(pairs);
       }
-      for (int p = sheet.block_pair_start[slot]; p < sheet.block_pair_start[slot + 1]; ++p) {
-        const auto [first, second] = sheet.block_pair[static_cast<std::size_t>(p)];
-        const double slope = response.element_slope[static_cast<std::size_t>(sheet.entry_element[static_cast<std::size_t>(first)])];
-        if (slope == 0) continue;  // a slider that slides
-        sum += slope * response.entry_gradient[static_cast<std::size_t>(first)] * response.entry_gradient[static_cast<std::size_t>(second)].transpose();
-      }
-      matrix.value[slot] = Block::from(sum);
+      matrix.value[slot] = sum;
     }
   });
+  response.constant_blocks_stand = true;
   for (const Spring& spring : sheet.springs) {
     const Eigen::Vector3d d = point(x, spring.a) - point(x, spring.b);
     const double length = std::max(d.norm(), 1e-12);

@@ -42,6 +42,8 @@ class CoarseSpace {
   /// The part of P c that belongs to a node, after solve().
   Float4 correction(std::size_t node) const;
   int patches() const;
+  /// Whether factor() has been called for a matrix of this size.
+  bool fits(const BlockMatrix& matrix) const;
 
  private:
   struct State;

@@ -26,13 +26,16 @@ struct SolveReport {
   bool converged = false;
 };
 
+/// Whether the coarse space gets a factor of its own or that of an earlier, similar matrix serves.
+enum class Coarse { anew, kept };
+
 /// Keeps scratch memory between calls. Precondition of solve: matrix + terms positive definite.
 class LinearSolver {
  public:
   /// Prepares the preconditioner. Diagonal blocks of the terms are taken in.
   /// x      where the matrix was taken, |rows| x 3 [m]
   /// fixed  nodes that do not move, |rows|
-  void factor(const BlockMatrix& matrix, const std::vector<ContactTerm>& terms, const mesh::Points3& x, const std::vector<char>& fixed);
+  void factor(const BlockMatrix& matrix, const std::vector<ContactTerm>& terms, const mesh::Points3& x, const std::vector<char>& fixed, Coarse coarse = Coarse::anew);
   /// matrix * x = b. matrix and terms as in factor().
   SolveReport solve(const BlockMatrix& matrix, const std::vector<ContactTerm>& terms, const std::vector<Float4>& b, std::vector<Float4>& x, const SolveOptions& options);
 

@@ -20,9 +20,18 @@ struct Block {
   Float4 operator*(Float4 x) const { return column[0] * splat(x[0]) + column[1] * splat(x[1]) + column[2] * splat(x[2]); }
   /// Product with the transpose.
   Float4 transposed_times(Float4 x) const {
-    const Float4 a = column[0] * x, b = column[1] * x, c = column[2] * x;
-    return Float4{a[0] + a[1] + a[2], b[0] + b[1] + b[2], c[0] + c[1] + c[2], 0.0f};
+    const Block p = Block{{column[0] * x, column[1] * x, column[2] * x}}.transposed();
+    return p.column[0] + p.column[1] + p.column[2];
   }
+  Block transposed() const {
+    const Float4 low = __builtin_shufflevector(column[0], column[1], 0, 4, 1, 5), high = __builtin_shufflevector(column[0], column[1], 2, 6, 3, 7);
+    return {{__builtin_shufflevector(low, column[2], 0, 1, 4, 7), __builtin_shufflevector(low, column[2], 2, 3, 5, 7), __builtin_shufflevector(high, column[2], 0, 1, 6, 7)}};
+  }
+  Block& operator+=(const Block& other) {
+    for (int c = 0; c < 3; ++c) column[c] += other.column[c];
+    return *this;
+  }
+  static Block identity(float factor) { return {{Float4{factor, 0, 0, 0}, Float4{0, factor, 0, 0}, Float4{0, 0, factor, 0}}}; }
   static Block zero() { return {{Float4{}, Float4{}, Float4{}}}; }
   static Block from(const Eigen::Matrix3d& m) { return {{load3(m.data()), load3(m.data() + 3), load3(m.data() + 6)}}; }
   Eigen::Matrix3d matrix() const {

@@ -119,7 +119,8 @@ struct SheetResponse {
   Points3 gradient;  ///< [N], |nodes| x 3
   BlockMatrix matrix;
   std::vector<Eigen::Matrix<double, 3, 3>> corner_force;  ///< columns: gradient at the corners of each face
-  std::vector<std::array<Eigen::Matrix3d, 6>> face_blocks;
+  std::vector<std::array<Block, 6>> face_blocks;
+  bool constant_blocks_stand = false;  ///< blocks of bending alone are those of the last evaluation; who changes them says false
   std::vector<Eigen::Vector3d> entry_gradient;            ///< of each element's number
   std::vector<double> element_force, element_slope;
 };
