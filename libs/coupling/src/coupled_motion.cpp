@@ -13,10 +13,11 @@ constexpr double same_time = 1e-9;  // [s]
 
 using dynamics::SupportState;
 
-SupportState state_of(double time, const std::vector<BodyState>& states) {
+SupportState state_of(double time, const std::vector<BodyState>& states, const std::vector<std::size_t>& which) {
   SupportState result;
   result.time = time;
-  for (const BodyState& s : states) {
+  for (const std::size_t b : which) {
+    const BodyState& s = states[b];
     dynamics::BodyPose pose;
     pose.rotation = Eigen::Quaterniond(s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]);
     pose.shift = Eigen::Vector3d(s.shift.data());
@@ -28,13 +29,20 @@ SupportState state_of(double time, const std::vector<BodyState>& states) {
 
 class CoupledMotion final : public dynamics::SupportMotion {
  public:
-  CoupledMotion(Cloth cloth, CoupledOptions options) : cloth_(std::move(cloth)), options_(std::move(options)), start_(cloth_.hello().start) {}
+  CoupledMotion(Cloth cloth, CoupledOptions options) : cloth_(std::move(cloth)), options_(std::move(options)), start_(cloth_.hello().start) {
+    const std::vector<std::string>& names = cloth_.hello().bodies;
+    for (std::size_t b = 0; b < names.size(); ++b) {
+      if (std::find(options_.known.begin(), options_.known.end(), names[b]) == options_.known.end()) continue;
+      bodies_.push_back(names[b]);
+      which_.push_back(b);
+    }
+  }
 
   ~CoupledMotion() override {
     if (!over_) cloth_.fail({"simulation_ended", {}, "the simulation ended before the motion did", "see what toile-simulate wrote"});
   }
 
-  const std::vector<std::string>& bodies() const override { return cloth_.hello().bodies; }
+  const std::vector<std::string>& bodies() const override { return bodies_; }
 
   Result<SupportState> start(double duration) override {
     const Hello& hello = cloth_.hello();
@@ -44,13 +52,11 @@ class CoupledMotion final : public dynamics::SupportMotion {
     }
     Welcome welcome;
     welcome.program = "toile-simulate";
-    for (const std::string& region : options_.regions) {
-      if (std::find(hello.bodies.begin(), hello.bodies.end(), region) != hello.bodies.end()) welcome.bodies.push_back(region);
-    }
+    welcome.bodies = bodies_;
     welcome.longest_step = options_.longest_step;
     welcome.wrenches.resize(hello.bodies.size());
     if (Issues issues = cloth_.welcome(welcome); !issues.empty()) return ended(issues);
-    return state_of(0, hello.states);
+    return state_of(0, hello.states, which_);
   }
 
   Result<SupportState> advance(double time, double step) override {
@@ -69,7 +75,7 @@ class CoupledMotion final : public dynamics::SupportMotion {
       const double to = asked.to - start_;
       if (to <= time + step + same_time) {
         reached_ = to;
-        return state_of(to, asked.states);
+        return state_of(to, asked.states, which_);
       }
       if (Issues issues = cloth_.refuse("the step is longer than the simulation's time_step", step); !issues.empty()) return ended(issues);
     }
@@ -81,8 +87,11 @@ class CoupledMotion final : public dynamics::SupportMotion {
       given_up_ = true;
       return Verdict::holds;
     }
-    std::vector<Wrench> told;
-    for (const dynamics::BodyWrench& w : wrenches) told.push_back({{w.force.x(), w.force.y(), w.force.z()}, {w.torque.x(), w.torque.y(), w.torque.z()}});
+    std::vector<Wrench> told(cloth_.hello().bodies.size());
+    for (std::size_t k = 0; k < wrenches.size(); ++k) {
+      const dynamics::BodyWrench& w = wrenches[k];
+      told[which_[k]] = {{w.force.x(), w.force.y(), w.force.z()}, {w.torque.x(), w.torque.y(), w.torque.z()}};
+    }
     if (Issues issues = cloth_.reached(told); !issues.empty()) return ended(issues);
     const auto order = cloth_.next();
     if (!order) return ended(order.issues());
@@ -115,6 +124,8 @@ class CoupledMotion final : public dynamics::SupportMotion {
 
   Cloth cloth_;
   CoupledOptions options_;
+  std::vector<std::string> bodies_;
+  std::vector<std::size_t> which_;  // of the master's bodies, those that are known here
   double start_, duration_ = 0, reached_ = 0;
   bool given_up_ = false, over_ = false;
 };
@@ -129,8 +140,8 @@ Result<std::unique_ptr<dynamics::SupportMotion>> coupled_motion(Channel channel,
   std::optional<Issue> wrong;
   if (!coupled.model.empty() && !hello.model.empty() && coupled.model != hello.model) {
     wrong = Issue{"other_model", {.item = "couple"}, "the mechanism moves another linkage than the one that the support was made from", "make the support again (toile-mechanism), or start the mechanism with the same file"};
-  } else if (std::none_of(coupled.regions.begin(), coupled.regions.end(), [&](const std::string& r) { return std::find(hello.bodies.begin(), hello.bodies.end(), r) != hello.bodies.end(); })) {
-    wrong = Issue{"unknown_body", {.item = "couple"}, "no region of the support is a body of the mechanism", coupled.regions.empty() ? "take the support that toile-mechanism writes" : suggestion(hello.bodies.front(), coupled.regions)};
+  } else if (std::none_of(coupled.known.begin(), coupled.known.end(), [&](const std::string& r) { return std::find(hello.bodies.begin(), hello.bodies.end(), r) != hello.bodies.end(); })) {
+    wrong = Issue{"unknown_body", {.item = "couple"}, "no body of the mechanism is a region of the support, or holds cloth", coupled.known.empty() ? "take the support that toile-mechanism writes" : suggestion(hello.bodies.front(), coupled.known)};
   }
   if (wrong) {
     cloth->fail(*wrong);

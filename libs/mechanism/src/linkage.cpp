@@ -180,7 +180,7 @@ Result<Configuration> Walk::to(double wanted) {
   const int steps = std::max(1, static_cast<int>(std::ceil(std::abs(wanted - s.at) / kStep)));
   const double start = s.at;
   for (int i = 1; i <= steps; ++i) {
-    const double next = start + (wanted - start) * i / steps;
+    const double next = i == steps ? wanted : start + (wanted - start) * i / steps;
     VectorXd trial = s.q + (next - s.at) * s.rate;
     bool closed = false;
     for (int round = 0; round < 20 && !closed; ++round) {
