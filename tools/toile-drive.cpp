@@ -21,7 +21,8 @@ struct DriveStage {
             .details = "Goes to a toile-simulate whose spec has `couple`, or another program that speaks the protocol of docs/coupling.md; either may be started first. "
                        "Each step of the linkage's motion is proposed to the cloth, which answers with its forces on the bodies. With the motors servo and torque a step is undone and repeated "
                        "until motion and reaction agree. The result is a table: time, angle, torques of motor, cloth and weight on the driver, work.",
-            .inputs = {{.name = "linkage", .doc = "bodies, pivots, bars and bows (YAML)", .kind = stage::FileKind::spec}},
+            .inputs = {{.name = "linkage", .doc = "bodies, pivots, bars and bows (YAML)", .kind = stage::FileKind::spec},
+                       {.name = "motion", .doc = "motor prescribed: table of toile-mechanism --motion, from which the poses are read as toile-simulate reads them off-line", .kind = stage::FileKind::csv, .required = false}},
             .output = stage::FileKind::csv};
   }
 
@@ -29,11 +30,16 @@ struct DriveStage {
     TOILE_TRY(const std::string text, run.bytes("linkage"));
     const std::string file = run.path("linkage");
     TOILE_TRY(const mechanism::Linkage linkage, io::read_record<mechanism::Linkage>(text, file));
+    std::unique_ptr<dynamics::SupportMotion> table;
+    if (run.has("motion")) {
+      TOILE_TRY(const std::string csv, run.bytes("motion"));
+      TOILE_TRY(table, dynamics::table_motion(csv, run.path("motion"), params.times.front()));
+    }
     TOILE_TRY(coupling::Channel channel, coupling::Channel::call(params.couple));
     coupling::DriveHooks hooks;
     hooks.progress = [&](double fraction, const std::string& text) { run.progress(fraction, text); };
     hooks.interrupted = [] { return stage::Run::interrupted(); };
-    auto result = coupling::drive(linkage, content_hash(text), params, std::move(channel), hooks);
+    auto result = coupling::drive(linkage, content_hash(text), params, std::move(channel), hooks, table.get());
     if (!result) return result.issues();
     const coupling::DriveReport& r = result->report;
     run.report("steps", r.steps);

@@ -65,13 +65,13 @@ struct Both {
   Issues cloth;
 };
 
-Both run(const mechanism::Linkage& linkage, const DriveParams& params, const Weight& weight, const CoupledOptions& coupled = {"", {"rod"}, 0, {}}) {
+Both run(const mechanism::Linkage& linkage, const DriveParams& params, const Weight& weight, const CoupledOptions& coupled = {"", {"rod"}, 0, {}}, dynamics::SupportMotion* table = nullptr) {
   ChannelOptions options;
   options.endpoint = "tcp://127.0.0.1:*";
   Channel listening = checked(Channel::listen(options));
   options.endpoint = listening.endpoint();
   Both both;
-  std::thread thread([&] { both.drive = drive(linkage, "drawing", params, checked(Channel::call(options))); });
+  std::thread thread([&] { both.drive = drive(linkage, "drawing", params, checked(Channel::call(options)), {}, table); });
   {
     auto motion = coupled_motion(std::move(listening), coupled);
     both.cloth = motion ? simulate(**motion, weight) : motion.issues();
@@ -177,6 +177,20 @@ TEST(drive, both_have_to_mean_the_same) {
   const Both coarse = run(pendulum(), p, {}, {"drawing", {"rod"}, 0.005, {}});
   EXPECT_EQ(first(checked(Result<DriveOutcome>(coarse.drive)).findings), "step_too_long");
   EXPECT_EQ(first(coarse.cloth), "step_too_long");
+}
+
+TEST(drive, a_table_says_where_bodies_are_in_a_prescribed_motion_only) {
+  const auto table = [](const char* body) {
+    return checked(dynamics::table_motion(fmt::format("time,body,x,y,z,qw,qx,qy,qz\n0,{0},0,0,0,1,0,0,0\n0.5,{0},0,0.1,0,1,0,0,0\n", body), "table.csv", 0));
+  };
+  DriveParams p;
+  p.times = {0, 0.5};
+  const auto lifted = table("rod"), other = table("road");
+  EXPECT_TRUE(checked(run(pendulum(), p, {.mass = 1}, {"", {"rod"}, 0, {}}, lifted.get()).drive).findings.empty());
+  const auto refused = [&](dynamics::SupportMotion& motion) { return codes(drive(pendulum(), "", p, checked(Channel::call({})), {}, &motion)); };
+  EXPECT_EQ(refused(*other), "unknown_body");
+  p.motor = Motor::servo;
+  EXPECT_EQ(refused(*lifted), "bad_combination");
 }
 
 TEST(drive, virtual_work_is_the_power_per_rate) {

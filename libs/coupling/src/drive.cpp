@@ -10,12 +10,9 @@ using mechanism::Configuration;
 using mechanism::DriverState;
 using mechanism::Reduced;
 
-constexpr int steps_before_longer = 4;  // good ones in a row, after which variable steps grow
-constexpr double growth = 1.5;
-
 class Drive {
  public:
-  Drive(const DriveParams& params, const DriveHooks& hooks, mechanism::Dynamics dynamics, mechanism::Walk walk) : params_(params), hooks_(hooks), dynamics_(std::move(dynamics)), walk_(std::move(walk)) {}
+  Drive(const DriveParams& params, const DriveHooks& hooks, mechanism::Dynamics dynamics, mechanism::Walk walk, dynamics::SupportMotion* table) : params_(params), hooks_(hooks), table_(table), dynamics_(std::move(dynamics)), walk_(std::move(walk)) {}
 
   Result<DriveOutcome> go(const mechanism::Linkage& linkage, const std::string& model, Channel channel) {
     state_ = {params_.angles.front(), params_.motor == Motor::torque ? 0 : mechanism::angle_motion(params_.times, params_.angles, params_.profile, params_.times.front()).rate};
@@ -31,6 +28,18 @@ class Drive {
     hello.steps = params_.steps;
     hello.time_step = params_.time_step;
     hello.states = states_of(*first, state_.rate);
+    if (table_) {
+      Issues issues;
+      for (const std::string& body : linkage.bodies) {
+        const auto it = std::find(table_->bodies().begin(), table_->bodies().end(), body);
+        if (it == table_->bodies().end()) issues.push_back(Issue{"unknown_body", {.item = "motion"}, fmt::format("the table has no body '{}'", body), "make it of the same linkage"});
+        row_of_body_.push_back(static_cast<std::size_t>(it - table_->bodies().begin()));
+      }
+      if (!issues.empty()) return issues;
+      const auto begins = table_->start(hello.end - hello.start);
+      if (!begins) return begins.issues();
+      hello.states = states_of(*begins);
+    }
     channel.set_interrupted(hooks_.interrupted);
     auto master = Master::greet(std::move(channel), hello);
     if (!master) return master.issues();
@@ -47,6 +56,19 @@ class Drive {
   }
 
  private:
+  /// Of the bodies of the linkage, in their order.
+  std::vector<BodyState> states_of(const dynamics::SupportState& state) const {
+    std::vector<BodyState> states;
+    for (const std::size_t b : row_of_body_) {
+      const dynamics::BodyPose& p = state.poses[b];
+      const dynamics::BodyTwist& t = state.twists[b];
+      states.push_back({{p.shift.x(), p.shift.y(), p.shift.z()}, {p.rotation.w(), p.rotation.x(), p.rotation.y(), p.rotation.z()},
+                        {t.linear.x(), t.linear.y(), t.linear.z()}, {t.angular.x(), t.angular.y(), t.angular.z()}});
+    }
+    return states;
+  }
+  std::vector<BodyState> states_of(const mechanism::Configuration& c, double rate) const { return coupling::states_of(c, rate); }
+
   Issues own(Issues issues) {
     own_ = true;
     return issues;
@@ -83,40 +105,42 @@ class Drive {
     if (fixed && longest < params_.time_step * (1 - 1e-9)) {
       return own({Issue{"step_too_long", {.item = "time_step"}, fmt::format("the cloth takes steps of {:g} s at most, {:g} s are asked for", longest, params_.time_step), "give the same time_step to both, or `steps: variable`"}});
     }
-    const auto count = std::max(1LL, static_cast<long long>(std::ceil((end - start) / params_.time_step - 1e-9)));
-    double h = longest;
-    int good = 0;
+    // As the simulation goes on by itself: up to the next multiple of the time step, by half steps where one was refused, longer ones after two that were not.
+    const double whole = fixed ? params_.time_step : longest;
+    const auto count = std::max(1LL, static_cast<long long>(std::ceil((end - start) / whole - 1e-9)));
+    double next = whole;
+    int passed = 0;
     row(start, 0, 0);
-    for (long long k = 1; master.time() < end; ++k) {
+    for (long long k = 1; master.time() < end;) {
       if (hooks_.interrupted && hooks_.interrupted()) return own({Issue{"interrupted", {}, fmt::format("stopped at {:g} s", master.time()), "start both programs again", Category::interrupted}});
-      // Fixed steps: times as the cloth counts them. What is left at the end is not cut into crumbs.
-      double to = fixed ? (k == count ? end : start + static_cast<double>(k) * params_.time_step) : master.time() + h;
-      if (!fixed && end - to < 0.1 * h) to = end - master.time() > 1.0000001 * longest ? 0.5 * (master.time() + end) : end;
-      const auto done = step(master, to);
+      const double until = k == count ? end : start + static_cast<double>(k) * whole;
+      const double rest = until - master.time();
+      const bool to_end = fixed || next > 0.99 * rest;
+      const double to = to_end ? until : master.time() + next;
+      // The length as the simulation reckons it, so that a table is read at the same times to the last bit.
+      const auto done = step(master, to, to_end && rest < whole * (1 - 1e-9) ? rest : std::min(next, whole));
       if (!done) return done.issues();
       if (*done > 0) {
-        // It has to be shorter.
         if (fixed) {
           return own({Issue{"refused", {.item = "time_step"}, fmt::format("the cloth refused the step at {:g} s: {}", master.time(), why_), "give a shorter time_step, or `steps: variable`", Category::check}});
         }
-        h = std::min(*done, 0.5 * (to - master.time()));
-        good = 0;
-        if (h < params_.least_step) {
-          return own({Issue{"step_too_short", {.item = "least_step"}, fmt::format("at {:g} s even {:.3g} s is too long: {}", master.time(), 2 * h, why_), "see what holds the cloth there, or give a smaller least_step", Category::check}});
+        const double tried = to - master.time();
+        next = std::min(*done, 0.5 * tried);
+        passed = 0;
+        if (next < params_.least_step) {
+          return own({Issue{"step_too_short", {.item = "least_step"}, fmt::format("at {:g} s even {:.3g} s is too long: {}", master.time(), tried, why_), "see what holds the cloth there, or give a smaller least_step", Category::check}});
         }
         continue;
       }
-      if (++good >= steps_before_longer && h < longest) {
-        h = std::min(growth * h, longest);
-        good = 0;
-      }
+      if (++passed >= 2) next = std::min(whole, 2 * next);
+      if (to == until) ++k;
       if (hooks_.progress) hooks_.progress((master.time() - start) / (end - start), fmt::format("t = {:.4f} s, {:.2f} deg", master.time(), state_.angle * 180 / M_PI));
     }
     return master.end();
   }
 
   /// One step, repeated until motion and reaction agree. 0: it holds; else the length to try next.
-  Result<double> step(Master& master, double to) {
+  Result<double> step(Master& master, double to, double length) {
     const double from = master.time(), h = to - from;
     double cloth = cloth_, part = 1, last_residual = 0, last_cloth = 0;
     for (int round = 1;; ++round) {
@@ -125,7 +149,13 @@ class Drive {
       mechanism::Walk trial = walk_;
       const auto configuration = trial.to(next->angle);
       if (!configuration) return own(configuration.issues());
-      const auto answer = master.step(to, states_of(*configuration, next->rate));
+      std::vector<BodyState> states = states_of(*configuration, next->rate);
+      if (table_) {
+        const auto row = table_->advance(from - params_.times.front(), length);
+        if (!row) return own(row.issues());
+        states = states_of(*row);
+      }
+      const auto answer = master.step(to, states);
       if (!answer) return answer.issues();
       ++outcome_.report.rounds;
       if (const auto* refused = std::get_if<Refused>(&*answer)) {
@@ -192,6 +222,8 @@ class Drive {
 
   const DriveParams& params_;
   const DriveHooks& hooks_;
+  dynamics::SupportMotion* table_;
+  std::vector<std::size_t> row_of_body_;
   mechanism::Dynamics dynamics_;
   mechanism::Walk walk_;   // at state_
   DriverState state_;
@@ -224,13 +256,14 @@ double on_driver(const Configuration& configuration, const std::vector<Wrench>& 
   return torque;
 }
 
-Result<DriveOutcome> drive(const mechanism::Linkage& linkage, const std::string& model, const DriveParams& params, Channel channel, const DriveHooks& hooks) {
+Result<DriveOutcome> drive(const mechanism::Linkage& linkage, const std::string& model, const DriveParams& params, Channel channel, const DriveHooks& hooks, dynamics::SupportMotion* table) {
   if (Issues issues = toile::validate(params); !issues.empty()) return issues;
   auto dynamics = mechanism::Dynamics::make(linkage, params.gravity);
   if (!dynamics) return dynamics.issues();
   auto walk = mechanism::Walk::begin(linkage);
   if (!walk) return walk.issues();
-  return Drive(params, hooks, std::move(*dynamics), std::move(*walk)).go(linkage, model, std::move(channel));
+  if (table && params.motor != Motor::prescribed) return Issue{"bad_combination", {.item = "motion"}, "a table prescribes the motion", "write `motor: prescribed`, or leave the input `motion` out", Category::usage};
+  return Drive(params, hooks, std::move(*dynamics), std::move(*walk), table).go(linkage, model, std::move(channel));
 }
 
 }  // namespace toile::coupling

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "toile/coupling/session.h"
+#include "toile/dynamics/support_motion.h"
 #include "toile/mechanism/inertia.h"
 
 #include <functional>
@@ -87,8 +88,10 @@ double on_driver(const mechanism::Configuration& configuration, const std::vecto
 
 /// Moves the linkage from the first of the times to the last, with the cloth at the other end of the channel.
 /// model  content hash of the linkage's file, for the other side to compare; may be empty
-/// error  what Dynamics::make and Master::greet report
-Result<DriveOutcome> drive(const mechanism::Linkage& linkage, const std::string& model, const DriveParams& params, Channel channel, const DriveHooks& hooks = {});
+/// table  motor prescribed: where the bodies are, instead of the linkage's own solution: to the last bit what a simulation off-line takes from it. The angles still
+///        say where the driver is, for torques. Null: none. Precondition: its time 0 is the first of the times
+/// error  what Dynamics::make and Master::greet report; "unknown_body" where the table does not have a body of the linkage, or another
+Result<DriveOutcome> drive(const mechanism::Linkage& linkage, const std::string& model, const DriveParams& params, Channel channel, const DriveHooks& hooks = {}, dynamics::SupportMotion* table = nullptr);
 
 }  // namespace toile::coupling
 
