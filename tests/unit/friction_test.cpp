@@ -67,5 +67,47 @@ TEST(FrictionOnASlope, SlidesAsFastAsItMust) {
   EXPECT_NEAR(way / (0.5 * acceleration), 1, 0.02);  // implicit Euler in 60 steps: 1 + 1/60
 }
 
+/// A square on the floor, an edge of it driven forth by 2 mm and back by `back` [m], equilibria in a row: force of the edge on the cloth, over
+/// friction coefficient and weight.
+double drag(double back, double time_step) {
+  const fabric::Card card = shirting();
+  const double mu = 0.3;
+  SimulationParams params;
+  params.support_friction = mu;
+  params.time_step = time_step;
+  params.increments = 15;
+  params.duration = 15;
+  params.max_iterations = 3000;
+  ConstraintSpec jaw;
+  jaw.name = "jaw";
+  jaw.on = {"sheet.right"};
+  jaw.kind = Hold::slide;
+  jaw.normal = {1, 0, 0};
+  jaw.times = {0, 10, 15};
+  jaw.move = {{0, 0, 0}, {0.002, 0, 0}, {0.002 - back, 0, 0}};
+  params.constraints = {jaw};
+  const double gap = params.support_reach - card.areal_density * params.gravity / params.contact_stiffness;
+  const GarmentMesh g = fixtures::sheet(6, 6, 0.06, 0.06, card, [&](double u, double v) { return Eigen::Vector3d(u - 0.5, gap, -v - 0.2); });
+  const auto result = simulate(g, floor_plane(1), params);
+  if (!result) {
+    ADD_FAILURE() << to_string(result.issues().front());
+    return 0;
+  }
+  EXPECT_TRUE(result->report.converged);
+  return result->report.reactions.front().force.x() / (mu * card.areal_density * 0.06 * 0.06 * params.gravity);
+}
+
+TEST(FrictionOfEquilibria, DragsWithItsCoefficientAndTurnsRound) {
+  EXPECT_NEAR(drag(0, 1.0 / 60), 1, 2e-3);
+  EXPECT_NEAR(drag(0.002, 1.0 / 60), -1, 2e-3);
+}
+
+TEST(FrictionOfEquilibria, DoesNotDependOnTheIterations) {
+  // About half of the way that turns the force round.
+  const double half = drag(7e-7, 1.0 / 60);
+  EXPECT_LT(std::abs(half), 0.9);
+  for (const double step : {1.0 / 240, 0.2}) EXPECT_NEAR(drag(7e-7, step), half, 5e-3) << step;
+}
+
 }  // namespace
 }  // namespace toile::dynamics

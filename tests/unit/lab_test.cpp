@@ -34,6 +34,10 @@ TEST(references, cantilever_with_friction) {
   EXPECT_NEAR(cantilever(10, 1).drop / cantilever(10, 1).reach, 0.6570, 5e-5);
   EXPECT_NEAR(cantilever(10, 2).drop / cantilever(10, 2).reach, 0.3900, 5e-5);
   EXPECT_EQ(cantilever(2, 1).drop, 0);  // locked
+  // Where curvature only grows, the path does not matter; at once, it does not anywhere.
+  EXPECT_NEAR(loaded_cantilever(10, 1, 20).drop / loaded_cantilever(10, 1, 20).reach, cantilever(10, 1).drop / cantilever(10, 1).reach, 5e-4);
+  EXPECT_NEAR(loaded_cantilever(100, 2, 1).drop / loaded_cantilever(100, 2, 1).reach, cantilever(100, 2).drop / cantilever(100, 2).reach, 4e-3);
+  EXPECT_NEAR(loaded_cantilever(100, 2, 100).drop / loaded_cantilever(100, 2, 100).reach, 4.732, 4e-3);
 }
 
 TEST(references, overhang_at_the_standard_angle) {

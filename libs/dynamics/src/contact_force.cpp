@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace toile::dynamics {
 namespace {
@@ -139,12 +140,23 @@ double add_friction(const std::vector<FrictionPair>& pairs, const Points3& start
   return energy;
 }
 
-std::vector<FrictionPair> update_friction(const std::vector<FrictionPair>& before, const Points3& start, const contact::Contacts& contacts, const Points3& x,
-                                          const Points3& support_x, const Eigen::VectorXd& node_area, const ContactLaws& laws) {
+namespace {
+
+/// How a pair goes on: in a step that is over, or within one, where motion is measured from its beginning.
+enum class Follow { over, held, balanced };
+
+std::vector<FrictionPair> present_pairs(Follow way, const std::vector<FrictionPair>& before, const Points3& start, const contact::Contacts& contacts, const Points3& x,
+                                        const Points3& support_x, const Eigen::VectorXd& node_area, const ContactLaws& laws) {
   std::vector<FrictionPair> after;
   std::vector<char> used(before.size(), 0);
   std::vector<std::size_t> fresh;
   const auto carry = [&](const FrictionPair& old, FrictionPair& pair) {
+    if (way != Follow::over) {
+      pair.slip = old.slip - pair.normal * pair.normal.dot(old.slip);
+      pair.fresh = way == Follow::held && old.fresh;
+      if (way == Follow::held && !old.fresh) pair.limit = old.limit;
+      return;
+    }
     const Eigen::Matrix3d old_tangent = Eigen::Matrix3d::Identity() - old.normal * old.normal.transpose();
     Eigen::Vector3d slip = old.slip + old_tangent * relative_motion(old, start, x);
     slip -= pair.normal * pair.normal.dot(slip);
@@ -182,6 +194,12 @@ std::vector<FrictionPair> update_friction(const std::vector<FrictionPair>& befor
   // A vertex that slid on to the next face keeps its slip.
   for (std::size_t i : fresh) {
     FrictionPair& pair = after[i];
+    if (way != Follow::over) {
+      // It begins to hold where it is now.
+      const Eigen::Vector3d moved = relative_motion(pair, start, x);
+      pair.slip = pair.normal * pair.normal.dot(moved) - moved;
+      pair.fresh = way == Follow::held;
+    }
     if (pair.kind == Kind::edge_edge || pair.kind == Kind::edge_support_edge) continue;
     const auto begin = std::lower_bound(before.begin(), before.end(), pair, [](const FrictionPair& p, const FrictionPair& q) { return std::tie(p.kind, p.a) < std::tie(q.kind, q.a); });
     for (auto it = begin; it != before.end() && it->kind == pair.kind && it->a == pair.a; ++it) {
@@ -192,7 +210,38 @@ std::vector<FrictionPair> update_friction(const std::vector<FrictionPair>& befor
       break;
     }
   }
+  if (way == Follow::balanced) {
+    for (FrictionPair& pair : after) {
+      const Eigen::Vector3d moved = relative_motion(pair, start, x);
+      const Eigen::Vector3d slip = pair.slip + moved - pair.normal * pair.normal.dot(moved);
+      if (pair.stiffness * slip.norm() < pair.limit * (1 - 1e-6)) pair.limit = std::numeric_limits<double>::infinity();
+    }
+  }
+  if (way != Follow::over) {
+    // A pair that has come apart may touch again before the step ends. It goes on holding until the next balance.
+    const std::size_t touching = after.size();
+    for (std::size_t j = 0; j < before.size(); ++j) {
+      if (used[j]) continue;
+      after.push_back(before[j]);
+      if (way == Follow::held && !before[j].fresh) continue;
+      after.back().limit = 0;
+      after.back().fresh = true;
+    }
+    std::inplace_merge(after.begin(), after.begin() + static_cast<std::ptrdiff_t>(touching), after.end(), [](const FrictionPair& p, const FrictionPair& q) { return std::tie(p.kind, p.a, p.b) < std::tie(q.kind, q.a, q.b); });
+  }
   return after;
+}
+
+}  // namespace
+
+std::vector<FrictionPair> update_friction(const std::vector<FrictionPair>& before, const Points3& start, const contact::Contacts& contacts, const Points3& x,
+                                          const Points3& support_x, const Eigen::VectorXd& node_area, const ContactLaws& laws) {
+  return present_pairs(Follow::over, before, start, contacts, x, support_x, node_area, laws);
+}
+
+std::vector<FrictionPair> follow_friction(const std::vector<FrictionPair>& before, const Points3& start, const contact::Contacts& contacts, const Points3& x,
+                                          const Points3& support_x, const Eigen::VectorXd& node_area, const ContactLaws& laws, bool balanced) {
+  return present_pairs(balanced ? Follow::balanced : Follow::held, before, start, contacts, x, support_x, node_area, laws);
 }
 
 }  // namespace toile::dynamics

@@ -152,6 +152,9 @@ class Run {
   Points3 x_;             // accepted positions, |nodes|
   Points3 velocity_;
   Points3 start_;         // of the current step: friction and inertia refer to it
+  // Equilibria in a row: friction refers to the beginning of the increment, so that where it ends does not depend on the iterations.
+  bool by_increment_ = false;
+  Points3 increment_start_;
   Points3 inertia_;       // where inertia alone would lead
   Eigen::VectorXd inertia_rate_;  // energy of inertia is mass * rate / 2 |x - inertia|^2 [1/s2]
   Points3 link_start_, link_offset_;
@@ -588,7 +591,7 @@ void Run::add_forces(const Points3& x, bool with_matrix) {
   potential_ = -sheet_.mass.dot(x * gravity_) - load_.cwiseProduct(x).sum();
   terms_.clear();
   contact_sums_ = add_repulsion(contacts_, x, support_x_, sheet_.area, laws_, gradient_, with_matrix ? &terms_ : nullptr);
-  friction_energy_ = add_friction(friction_, start_, x, gradient_, with_matrix ? &terms_ : nullptr);
+  friction_energy_ = add_friction(friction_, by_increment_ ? increment_start_ : start_, x, gradient_, with_matrix ? &terms_ : nullptr);
   if (damped_) {
     const Points3 moved = x - resistance_origin_;
     const Eigen::VectorXd rate = resistance_.cwiseProduct(velocity_rate_);
@@ -791,7 +794,11 @@ bool Run::iterate() {
 
 /// The step is over: friction takes note, the next step starts here.
 void Run::accept() {
-  friction_ = update_friction(friction_, start_, contacts_, x_, support_x_, sheet_.area, laws_);
+  if (by_increment_) {
+    friction_ = follow_friction(friction_, increment_start_, contacts_, x_, support_x_, sheet_.area, laws_, false);
+  } else {
+    friction_ = update_friction(friction_, start_, contacts_, x_, support_x_, sheet_.area, laws_);
+  }
   const double total = energy_ - friction_energy_;
   if (total <= last_total_) {
     inertia_ = x_ + momentum_ * (x_ - start_);
@@ -944,7 +951,15 @@ bool Run::relax() {
     accept();
     // Friction's slip has been carried on; the force it gives is part of the balance from here on.
     add_forces(x_, true);
-    const double residual = static_residual();
+    double residual = static_residual();
+    if (by_increment_ && residual <= params_.residual && held_error() <= at_target && !friction_.empty()) {
+      // In balance with the normal forces of the last balance; now with its own.
+      friction_ = follow_friction(friction_, increment_start_, contacts_, x_, support_x_, sheet_.area, laws_, true);
+      add_forces(x_, true);
+      residual = static_residual();
+      best = std::max(best, residual);
+      stalled = 0;
+    }
     log_row("relaxing");
     if (hooks_.progress && params_.increments == 1) {
       hooks_.progress(std::clamp(0.2 + 0.8 * std::log(residual / 10) / std::log(params_.residual / 10), 0.2, 1.0), fmt::format("iteration {}, residual {:.2e}", report_.iterations, residual));
@@ -982,9 +997,13 @@ bool Run::relax() {
 void Run::equilibria() {
   gravity_part_ = 1;
   report_.converged = true;
+  by_increment_ = params_.increments > 1;
   for (int k = 1; k <= params_.increments && !interrupted(); ++k) {
     set_time(params_.duration * k / params_.increments);
+    increment_start_ = x_;
+    if (by_increment_ && !friction_.empty()) friction_ = follow_friction(friction_, x_, contacts_, x_, support_x_, sheet_.area, laws_, true);
     if (!relax()) report_.converged = false;
+    if (by_increment_) friction_ = update_friction(friction_, increment_start_, contacts_, x_, support_x_, sheet_.area, laws_);
     record_row();
     // Within an increment friction between yarns is a potential: where it leads does not depend on the iterations.
     mechanics::advance_friction(sheet_, x_);

@@ -91,6 +91,74 @@ Cantilever cantilever(double gamma, double eta) {
   return {end[2], end[3]};
 }
 
+Cantilever loaded_cantilever(double gamma, double eta, int steps) {
+  TOILE_CHECK(gamma > 0 && gamma <= 1000 && eta >= 0 && steps >= 1, "gamma {}, eta {}, steps {}", gamma, eta, steps);
+  // Link i makes the angle t[i] with the level; joint i is before it, the first has half a link of strip. What hangs beyond the middle of
+  // a link turns it, so the energy of the weight is a sum over links.
+  constexpr int links = 400;
+  constexpr double h = 1.0 / links, stiffness = 1000;
+  const double open = eta / stiffness;
+  std::vector<double> angle(links, 0.0), anchor(links, 0.0);
+  const auto part = [](int i) { return i == 0 ? 0.5 * h : h; };
+  const auto curvature = [&](const std::vector<double>& t, int i) { return (t[static_cast<std::size_t>(i)] - (i == 0 ? 0 : t[static_cast<std::size_t>(i - 1)])) / part(i); };
+  for (int k = 1; k <= steps; ++k) {
+    const auto weight = [&](int i) { return gamma * k / steps * (1 - (i + 0.5) * h) * h; };
+    const auto energy = [&](const std::vector<double>& t) {
+      double sum = 0;
+      for (int i = 0; i < links; ++i) {
+        const double c = curvature(t, i), d = std::abs(c - anchor[static_cast<std::size_t>(i)]);
+        sum += part(i) * (0.5 * c * c + (d <= open ? 0.5 * stiffness * d * d : eta * (d - 0.5 * open))) - weight(i) * std::sin(t[static_cast<std::size_t>(i)]);
+      }
+      return sum;
+    };
+    for (int iteration = 0; iteration < 500; ++iteration) {
+      // Newton, tridiagonal, the weight's part of the second derivative where it is positive.
+      std::vector<double> slope(links, 0.0), diagonal(links, 0.0), beside(links, 0.0), move(links), reduced(links, 0.0);
+      for (int i = 0; i < links; ++i) {
+        const auto j = static_cast<std::size_t>(i);
+        const double c = curvature(angle, i), d = c - anchor[j];
+        const bool sticks = std::abs(d) <= open;
+        const double moment = c + (sticks ? stiffness * d : d > 0 ? eta : -eta), rigidity = (1 + (sticks ? stiffness : 0)) / part(i);
+        slope[j] += moment - weight(i) * std::cos(angle[j]);
+        diagonal[j] += rigidity + std::max(0.0, weight(i) * std::sin(angle[j]));
+        if (i == 0) continue;
+        slope[j - 1] -= moment;
+        diagonal[j - 1] += rigidity;
+        beside[j] = -rigidity;
+      }
+      double largest = 0;
+      for (const double s : slope) largest = std::max(largest, std::abs(s));
+      if (largest < 1e-11 * std::max(1.0, gamma)) break;
+      double pivot = diagonal[0];
+      move[0] = -slope[0] / pivot;
+      for (std::size_t j = 1; j < links; ++j) {
+        reduced[j - 1] = beside[j] / pivot;
+        pivot = diagonal[j] - beside[j] * reduced[j - 1];
+        move[j] = (-slope[j] - beside[j] * move[j - 1]) / pivot;
+      }
+      for (std::size_t j = links - 1; j-- > 0;) move[j] -= reduced[j] * move[j + 1];
+      const double before = energy(angle);
+      std::vector<double> trial(links);
+      for (double length = 1; length > 1e-9; length *= 0.5) {
+        for (std::size_t j = 0; j < links; ++j) trial[j] = angle[j] + length * move[j];
+        if (energy(trial) <= before + 1e-14 * std::abs(before)) break;
+      }
+      angle = trial;
+    }
+    for (int i = 0; i < links; ++i) {
+      const double c = curvature(angle, i);
+      double& a = anchor[static_cast<std::size_t>(i)];
+      if (std::abs(c - a) > open) a = c > a ? c - open : c + open;
+    }
+  }
+  Cantilever end;
+  for (const double t : angle) {
+    end.reach += h * std::cos(t);
+    end.drop += h * std::sin(t);
+  }
+  return end;
+}
+
 double overhang(double angle, double rho) {
   const double tangent = std::tan(angle);
   return root(1e-2, 12, [&](double l) {

@@ -43,8 +43,9 @@ struct FrictionPair {
   std::array<double, 4> weight;
   Eigen::Vector3d normal;          ///< unit
   Eigen::Vector3d slip;            ///< elastic tangential displacement [m]
-  double limit = 0;                ///< friction coefficient times normal force [N]
+  double limit = 0;                ///< friction coefficient times normal force; infinite: sticks for now [N]
   double stiffness = 0;            ///< [N/m]
+  bool fresh = false;              ///< touches since the last balance of forces only
 };
 
 struct ContactSums {
@@ -67,5 +68,13 @@ double add_friction(const std::vector<FrictionPair>& pairs, const Points3& start
 /// What friction remembers after a step: present contacts with their slip carried on from `before` and cut back to the cone.
 std::vector<FrictionPair> update_friction(const std::vector<FrictionPair>& before, const Points3& start, const contact::Contacts& contacts, const Points3& x,
                                           const Points3& support_x, const Eigen::VectorXd& node_area, const ContactLaws& laws);
+
+/// The same in the midst of a step whose end shall not depend on the way that its iterations take there. Motion is measured from the
+/// step's beginning, with the slip of that time; a pair that is new holds from where it is at x. Until forces are in balance a pair that
+/// stuck when they last were sticks, whatever the iterations do to its forces, even where it comes apart for a while, and the cone of one
+/// that slid stays as it was; that of a new one follows x.
+/// balanced  forces are in balance at x: cones are those of x, and what is beyond its own begins to slide
+std::vector<FrictionPair> follow_friction(const std::vector<FrictionPair>& before, const Points3& start, const contact::Contacts& contacts, const Points3& x,
+                                          const Points3& support_x, const Eigen::VectorXd& node_area, const ContactLaws& laws, bool balanced);
 
 }  // namespace toile::dynamics

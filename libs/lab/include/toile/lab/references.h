@@ -11,11 +11,18 @@ struct Cantilever {
   double drop = 0, reach = 0;
 };
 
-/// Inextensible strip of moment B kappa + HB (no curvature where the moment is below HB), loaded once from straight.
+/// Inextensible strip of moment B kappa + HB (no curvature where the moment is below HB): loaded once from straight, as long as curvature
+/// grows everywhere. Where gamma is large it falls again away from the clamp on the way there; then this is the shape for the whole load
+/// put on at once, and loaded_cantilever() that for a load that grows.
 /// gamma  w L^3/B, w weight per area
 /// eta    HB L/B; 0: without friction
 /// Precondition: 0 < gamma <= 5000, eta >= 0
 Cantilever cantilever(double gamma, double eta = 0);
+
+/// The same strip, its weight put on in equal steps from none: friction holds curvature while the moment is within HB of B kappa. A
+/// chain of 400 links with sliders a thousand times as stiff as B.
+/// Precondition: 0 < gamma <= 1000, eta >= 0, steps >= 1
+Cantilever loaded_cantilever(double gamma, double eta, int steps);
 
 /// Overhang at which the chord from clamp to free end dips by `angle` [rad], in units of the bending length (B/w)^(1/3).
 /// rho  HB (B/w)^(1/3)/B
