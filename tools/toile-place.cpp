@@ -28,7 +28,7 @@ struct PlaceStage {
 
   static stage::Description description() {
     return {.name = "toile-place",
-            .version = 9,
+            .version = 10,
             .summary = "Bends sewn flat panels around a body without stretching them and draws their seams together.",
             .example = "toile-place layered.ply form.ply -o placed.ply",
             .details = "Each panel goes on the trunk, an arm or a leg, as its name and its seams say (front, back, waistband, sleeve, leg, trouser), or as `panels` "

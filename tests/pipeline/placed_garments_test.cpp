@@ -121,6 +121,25 @@ TEST(placed_garments, jacket_has_its_lapels_turned_and_its_sleeves_on) {
     ++lapels;
   }
   EXPECT_EQ(lapels, 2);
+  // The collar is turned at its roll line: at the centre back the edge of its fall hangs under it, on the outside.
+  const auto at = [&](const std::string& name) -> Eigen::Vector3d {
+    for (const mesh::NamedPoint& point : g.points) {
+      if (point.name == name && g.panels[static_cast<std::size_t>(point.panel)].name == "undercollar") return placed.garment.x.row(point.vertex).transpose();
+    }
+    ADD_FAILURE() << "the undercollar has no point " << name;
+    return Eigen::Vector3d::Zero();
+  };
+  EXPECT_LT(at("cb_fall").y(), at("cb_roll").y() - 0.025);
+  EXPECT_LT(at("cb_fall").z(), at("cb_roll").z());
+  EXPECT_LT(at("cb_neck").y(), at("cb_roll").y() - 0.02);
+  for (std::size_t s = 0; s < g.seams.size(); ++s) {
+    if (g.seams[s].name.rfind("gorge", 0) != 0) continue;
+    for (const mesh::Weld& weld : g.welds) {
+      if (weld.seam == static_cast<int>(s)) EXPECT_LT((placed.garment.x.row(weld.a) - placed.garment.x.row(weld.b)).norm(), 0.015) << g.seams[s].name;
+    }
+  }
+  // The fronts are lapped.
+  for (const mesh::Fastener& fastener : g.fasteners) EXPECT_LT((placed.garment.x.row(fastener.a) - placed.garment.x.row(fastener.b)).norm(), 0.02);
 }
 
 TEST(placed_garments, one_spec_serves_three_sizes) {

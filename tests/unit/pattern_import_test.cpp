@@ -192,6 +192,18 @@ TEST(ImportFreesewing, points_may_be_made_of_points) {
   EXPECT_EQ(cut->segments.size(), 1u);
 }
 
+TEST(ImportFreesewing, an_outline_may_be_drawn_anew_through_points) {
+  const auto imported = import(
+      "pieces: [{name: s, part: sample.sleeve, made: {e: {from: b, by: [-20 mm, -100 mm]}}, path: a>b>(e)>d>a, edges: {hem: b>d}}]");
+  ASSERT_TRUE(imported) << to_string(imported.issues().front());
+  const Piece& piece = imported->pattern.pieces[0];
+  ASSERT_EQ(piece.outline.size(), 3u);
+  const auto hem = std::find_if(piece.outline.begin(), piece.outline.end(), [](const Edge& edge) { return edge.name == "hem"; });
+  ASSERT_NE(hem, piece.outline.end());
+  ASSERT_EQ(hem->segments.size(), 1u);
+  EXPECT_EQ(hem->segments, std::vector<Segment>{pattern::quadratic_segment({100, 0}, {80, 100}, {10, 80})});
+}
+
 TEST(ImportFreesewing, lines_may_bend_and_end_where_the_cloth_does) {
   const auto imported = import(with(
       with(good_spec, "    lines:", "    made: {l: {from: top, by: [20 mm, -80 mm]}, r: {from: l, by: [60 mm, 0]}}\n    lines:"),
@@ -282,6 +294,7 @@ INSTANTIATE_TEST_SUITE_P(
                     BadImport{"line_off_the_cloth", "path: pocket", "run: off>curveOff", "line_outside"},
                     BadImport{"made_point", "fold: centre", "made: {new: {from: tup, by: [0, 0]}}", "unknown_point"},
                     BadImport{"made_again", "fold: centre", "made: {top: {from: neck, by: [0, 0]}}", "duplicate_name"},
+                    BadImport{"open_run", "fold: centre", "path: top>neck>side", "bad_run"},
                     BadImport{"made_in_a_circle", "fold: centre",
                               "made: {new: {from: neck, to: old, fraction: 0.5}, old: {from: new, by: [0, 0]}}", "bad_point"},
                     BadImport{"made_towards_itself", "fold: centre",
@@ -468,7 +481,7 @@ TEST(SamplePatterns, seams_of_the_jacket_fit) {
     std::vector<std::string> edges_b;
     double length_b;
   };
-  // As measured on the draft itself.
+  // As measured on the draft itself, but for the stand seam and the outer edge of the collar, which is drawn anew.
   const std::vector<Row> rows{
       {"front", {"dart_side"}, 209.48, "front", {"dart_front"}, 209.48},
       {"front", {"side"}, 439.52, "side", {"front"}, 435.94},
@@ -479,8 +492,8 @@ TEST(SamplePatterns, seams_of_the_jacket_fit) {
       {"topsleeve", {"outseam"}, 422.73, "undersleeve_m", {"outseam"}, 423.14},
       {"topsleeve", {"vent"}, 101.77, "undersleeve_m", {"vent"}, 101.77},
       {"undercollar", {"gorge"}, 66.52, "front", {"gorge"}, 66.52},
-      {"collar", {"stand"}, 154.40, "collar_stand", {"collar"}, 154.40},
-      {"collar", {"outer"}, 144.205, "undercollar", {"outer"}, 144.205},
+      {"collar", {"stand"}, 164.46, "collar_stand", {"collar"}, 164.46},
+      {"collar", {"outer"}, 186.52, "undercollar", {"outer"}, 187.00},
       {"facing", {"gorge", "lapel_top", "lapel", "front"}, 798.21, "front", {"gorge", "lapel_top", "lapel", "front"}, 798.21},
       {"facing", {"inner"}, 707.07, "front_lining", {"inner"}, 687.07},
   };

@@ -163,6 +163,8 @@ class PieceImport {
           report("bad_point", name, fmt::format("'{}' and '{}' are the same place", made.from, made.to),
                  "name two different points");
         }
+        // As many digits as drafted ones have: names find it again where it is used.
+        p = Point2((p.array() * 1e6).round() / 1e6);
         part_.points.emplace_back(name, p);
         it = open.erase(it);
         progress = true;
@@ -213,7 +215,17 @@ class PieceImport {
     return closed.size() == 1 ? closed.front() : "seam";
   }
 
+  /// A path of the draft by its name, or one drawn through points: a>b>(c)>(d)>a.
   std::optional<Loop> closed_path(const std::string& name) {
+    if (name.find('>') != std::string::npos) {
+      const std::vector<Segment> drawn = line_of_run("path", name);
+      if (drawn.empty()) return std::nullopt;
+      if ((drawn.front().from - drawn.back().to).norm() > same_place) {
+        report("bad_run", "path", fmt::format("'{}' does not end where it begins", name), "let its last point be its first");
+        return std::nullopt;
+      }
+      return Loop{drawn};
+    }
     const DraftPath* path = part_.path(name);
     if (!path) {
       report("unknown_path", name, fmt::format("part '{}' has no path '{}'", part_.name, name),

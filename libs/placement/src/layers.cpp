@@ -31,6 +31,7 @@ constexpr double kSpread = 0.01;     // seams that are shorter do not say how a 
 constexpr double kPush = 0.0005;     // by which layers that cut their cloth leave it, a round [m]
 constexpr double kDraw = 0.001;      // by which borders that cut other cloth than their own are drawn in, a round [m]
 constexpr double kDrawn = 0.007;     // at most [m]
+constexpr double kFlattest = 0.3;    // part of its area that a triangle keeps when its corners are drawn in
 constexpr double kPull = 0.7;        // of the distance from their own cloth that they keep where they cut other cloth
 constexpr double kDrawnIn = 0.5;     // of the gap: borders, so that layers that meet at a seam do not touch
 constexpr double kAlike = 0.1;       // cosine between normals from which cloth beside a layer's own lies under it too
@@ -155,6 +156,10 @@ class Laying {
     for (Eigen::Index v = 0; v < garment.vertex_count(); ++v) members_[static_cast<std::size_t>(garment.vertex_panel[v])].push_back(static_cast<int>(v));
     neighbours_.resize(static_cast<std::size_t>(x.rows()));
     on_border_.assign(static_cast<std::size_t>(x.rows()), 0);
+    faces_at_.resize(static_cast<std::size_t>(x.rows()));
+    for (Eigen::Index f = 0; f < garment.face_count(); ++f) {
+      for (int k = 0; k < 3; ++k) faces_at_[static_cast<std::size_t>(garment.faces(f, k))].push_back(static_cast<int>(f));
+    }
     for (const mesh::Edge& edge : mesh::edges(garment.faces)) {
       neighbours_[static_cast<std::size_t>(edge.a)].push_back(edge.b);
       neighbours_[static_cast<std::size_t>(edge.b)].push_back(edge.a);
@@ -419,6 +424,23 @@ class Laying {
     return length > 1e-9 ? Vector2d(sum / length) : Vector2d::Zero();
   }
 
+  // Whether its triangles stay the right way up when it is drawn in further: turned over between two sheets they would stay so.
+  bool can_be_drawn(int v) const {
+    const auto at = [&](int w, double more) {
+      return Vector2d(garment_.uv.row(w).transpose() + (drawn_[static_cast<std::size_t>(w)] + more) * inwards_at_border(w));
+    };
+    for (const int f : faces_at_[static_cast<std::size_t>(v)]) {
+      std::array<Vector2d, 3> flat, drawn;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const int w = garment_.faces(f, static_cast<int>(k));
+        flat[k] = garment_.uv.row(w).transpose();
+        drawn[k] = at(w, w == v ? kDraw : 0.0);
+      }
+      if (cross(drawn[1] - drawn[0], drawn[2] - drawn[0]) < kFlattest * cross(flat[1] - flat[0], flat[2] - flat[0])) return false;
+    }
+    return true;
+  }
+
   // What lies off the cloth, but inside the layer's panel.
   void spread_over_darts(int panel, const std::vector<char>& beyond) {
     std::set<int> seen;
@@ -479,7 +501,7 @@ class Laying {
       for (const int v : pulled) {
         if (pushed.count(v)) continue;
         double& drawn = drawn_[static_cast<std::size_t>(v)];
-        if (on_border_[static_cast<std::size_t>(v)] && drawn < kDrawn) {
+        if (on_border_[static_cast<std::size_t>(v)] && drawn < kDrawn && can_be_drawn(v)) {
           drawn += kDraw;
           const auto& [candidate, side] = laid_by_[static_cast<std::size_t>(garment_.vertex_panel[v])];
           find_base(v, candidate, side);
@@ -517,7 +539,7 @@ class Laying {
   Points3 normals_;                          // at the vertices of laid panels
   Points3 base_, away_;                      // of layers: on the cloth under them, and the way off it
   std::vector<double> distance_;             // along away_
-  std::vector<std::vector<int>> members_, neighbours_;
+  std::vector<std::vector<int>> members_, neighbours_, faces_at_;
   std::vector<char> on_border_;
   std::map<int, Vector2d> border_normals_;   // into the panels, not of unit length
   std::map<int, std::vector<int>> mates_;

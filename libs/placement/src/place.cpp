@@ -45,6 +45,8 @@ constexpr int kLayerPolishing = 20;       // steps before the panels under them 
 constexpr double kLayerSeam = 0.1;        // of the pull of other seams: those of linings that hang lower than their hem stay open
 constexpr double kLayerClosed = 0.005;    // seams of layers that start closed [m]
 constexpr double kShellShare = 0.7;       // of the work
+constexpr double kLooseFastening = 0.03;   // part of its gap that a sweep on the fine mesh closes at what is buttoned
+constexpr double kLoose = 0.004;           // where it may come so much farther apart than its length, for seams to close better [m]
 constexpr double kSheet = 0.004;           // between sheets that lie on one another at the start [m]
 
 double polygon_perimeter(const Points2& p) {
@@ -732,6 +734,12 @@ Result<Placed> place_on_frame(const mesh::GarmentMesh& garment, const mesh::Supp
   return placed;
 }
 
+// Cloth that cuts itself, pulled out of itself.
+Points3 pulled_apart(const mesh::GarmentMesh& garment, const Points3& x) {
+  const contact::Surface cloth = contact::make_surface(static_cast<int>(x.rows()), garment.faces, mesh::particles(garment));
+  return contact::self_intersections(cloth, x).empty() ? x : contact::untangle(cloth, x).x;
+}
+
 // A garment without free layers, laid on the support.
 struct Laid {
   Points3 x;
@@ -795,7 +803,8 @@ Result<Laid> lay_shell(const mesh::GarmentMesh& sewn, const Rooms& rooms, const 
     stage.room_outside = tubes.restricted(room.outside);
     stage.settling_steps = stage.polishing_steps = 0;
     Points3 x = tubes.merged(relax(tubes.mesh, tubes.restricted(bent), support, stage), bent);
-    x = attach(mesh, flat, layout, x, support, params.offset);
+    // Turned over a curved line, a collar's fall may start in creases that cut one another.
+    x = pulled_apart(mesh, attach(mesh, flat, layout, x, support, params.offset));
     stage = options;
     stage.rolled = rolled_of(x);
     stage.room_inside = room.inside;
@@ -842,6 +851,11 @@ Result<Laid> lay_shell(const mesh::GarmentMesh& sewn, const Rooms& rooms, const 
   options.closing_steps = 0;
   options.swelling_steps = 0;
   options.settling_steps = params.fine_steps;
+  // Under layers fronts keep their lap, or the edges of facings meet in it.
+  if (rooms.inside.empty()) {
+    options.fasten = kLooseFastening;
+    options.loose = kLoose;
+  }
   for (std::size_t i = stays ? 0 : meshes.size(); i-- > 0;) {
     done += 1;
     if (i + 1 < meshes.size() || meshes.size() == 1) {
@@ -853,9 +867,7 @@ Result<Laid> lay_shell(const mesh::GarmentMesh& sewn, const Rooms& rooms, const 
     if (i == 0) break;
     x = coarse[i - 1].prolonged(x);
     // A fine triangle that lies across an edge of the coarse mesh cuts its corner: sheets near one another may come through.
-    const mesh::GarmentMesh& finer = *meshes[i - 1].mesh;
-    const contact::Surface cloth = contact::make_surface(static_cast<int>(x.rows()), finer.faces, mesh::particles(finer));
-    if (!contact::self_intersections(cloth, x).empty()) x = contact::untangle(cloth, x).x;
+    x = pulled_apart(*meshes[i - 1].mesh, x);
   }
   laid.x = x;
   laid.wanted = wanted_directions(garment, folded_flat, layout, start.x);

@@ -140,6 +140,9 @@ class Relaxation {
     }
     make_guards();
     for (const mesh::Weld& weld : garment.welds) closed_.push_back((start.row(weld.a) - start.row(weld.b)).norm() < options.closed);
+    for (const mesh::Fastener& fastener : garment.fasteners) {
+      fastened_.push_back((start.row(fastener.a) - start.row(fastener.b)).norm() < fastener.length + options.closed);
+    }
     for (const mesh::Edge& edge : mesh::edges(garment.faces)) {
       const auto panel = static_cast<std::size_t>(garment.vertex_panel[edge.a]);
       if (!free(edge.a)) continue;
@@ -512,15 +515,16 @@ class Relaxation {
         if (length > 0) x_.row(target.vertex) += std::min(step.closed_seam, kSeamMove / length) * d;
       }
     }
-    if (step.seam > 0) {
-      for (const mesh::Fastener& fastener : garment_.fasteners) {
-        if (!fastener.closed) continue;
-        const Eigen::RowVector3d d = x_.row(fastener.b) - x_.row(fastener.a);
-        const double length = d.norm();
-        const double open = length - std::max(fastener.length, 1.5 * options_.thickness);
-        if (open <= 0) continue;
-        draw_together(fastener.a, fastener.b, (std::min(0.5 * step.seam * open, kSeamMove) / length) * d);
-      }
+    // What is buttoned stays so, or the fronts would part as seams let go.
+    for (std::size_t i = 0; i < garment_.fasteners.size(); ++i) {
+      const mesh::Fastener& fastener = garment_.fasteners[i];
+      const double part = fastened_[i] ? std::max(step.seam, options_.fasten) : step.seam;
+      if (!fastener.closed || part <= 0) continue;
+      const Eigen::RowVector3d d = x_.row(fastener.b) - x_.row(fastener.a);
+      const double length = d.norm();
+      const double open = length - std::max(fastener.length, 1.5 * options_.thickness) - (step.seam > 0 ? 0.0 : options_.loose);
+      if (open <= 0) continue;
+      draw_together(fastener.a, fastener.b, (std::min(0.5 * part * open, kSeamMove) / length) * d);
     }
     parallel_for(stretches_.size(), 1, [&](std::size_t panel) { sweep_panel(panel, step.bending, forward); });
     for (std::size_t i = 0; i < contacts_.size(); ++i) keep_contact(i);
@@ -690,6 +694,7 @@ class Relaxation {
   std::vector<char> free_;    // by vertex: it may move
   Points3 sides_;             // normals at the vertices, not of unit length
   std::vector<char> closed_;  // by weld: nearly closed at the start
+  std::vector<char> fastened_;  // by fastener: the same
   std::vector<Stretch> tight_;               // while polishing
   std::vector<Bend> tight_bends_;
   double ironing_ = 0;                       // of them: part of a curvature that a sweep takes out

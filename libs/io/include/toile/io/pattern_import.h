@@ -115,7 +115,7 @@ struct ImportPiece {
     f(&ImportPiece::name, {.key = "name", .doc = "name of the piece", .required = true});
     f(&ImportPiece::part, {.key = "part", .doc = "part of the draft", .required = true});
     f(&ImportPiece::path,
-      {.key = "path", .doc = "path that is the seam line; without it `seam`, else the only one drawn"});
+      {.key = "path", .doc = "path that is the seam line, or one drawn through points: a>b>(c)>(d)>a; without it `seam`, else the only one drawn"});
     f(&ImportPiece::material,
       {.key = "material", .doc = "which material of the cut list it is cut from, or another one together with `cut`; without it the first"});
     f(&ImportPiece::cut,

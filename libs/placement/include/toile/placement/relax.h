@@ -36,6 +36,8 @@ struct RelaxOptions {
   double rms_strain = 0.0008;  ///< and root mean square [1]
   double seam = 0.05;          ///< part of a seam's gap that one sweep closes
   double closed = 0.02;        ///< a seam that starts with a smaller gap is held firmly: no limb gets through it [m]
+  double fasten = 0.3;         ///< part of its gap that one sweep closes at a fastener that starts nearly closed, also while seams let go
+  double loose = 0;            ///< so much farther apart than its length it may come then [m]
   bool ironing = false;        ///< bending goes on where polishing finds large strains: creases that should not be there lose themselves
   int substeps = 8;            ///< of a step, between two searches for contacts
   double bending = 0.1;        ///< part of a curvature that one sweep takes out, until polishing
