@@ -1,6 +1,7 @@
 // Turns a linkage by a motor while cloth hangs on it.
 #include "toile/base/hash.h"
 #include "toile/coupling/drive.h"
+#include "toile/inspect/plot.h"
 #include "toile/io/record_yaml.h"
 #include "toile/stage/stage.h"
 
@@ -24,6 +25,19 @@ struct DriveStage {
             .inputs = {{.name = "linkage", .doc = "bodies, pivots, bars and bows (YAML)", .kind = stage::FileKind::spec},
                        {.name = "motion", .doc = "motor prescribed: table of toile-mechanism --motion, from which the poses are read as toile-simulate reads them off-line", .kind = stage::FileKind::csv, .required = false}},
             .output = stage::FileKind::csv};
+  }
+
+  static Result<std::string> chart(const std::vector<coupling::DriveRow>& rows) {
+    inspect::Series motor{.name = "motor", .color = {0.1, 0.3, 0.7}}, cloth{.name = "cloth", .color = {0.8, 0.2, 0.1}}, weight{.name = "weight of the frame", .color = {0.4, 0.4, 0.4}, .stroke = inspect::Stroke::dashed};
+    for (const coupling::DriveRow& row : rows) {
+      for (const auto& [series, torque] : {std::pair{&motor, row.motor}, std::pair{&cloth, row.cloth}, std::pair{&weight, row.weight}}) {
+        series->x.push_back(row.angle * 180 / M_PI);
+        series->y.push_back(torque);
+      }
+    }
+    const inspect::Chart all{"Torques on the driver", "angle of the driver [deg]", "torque [N m]", {motor, weight, cloth}, {}, {}};
+    const inspect::Chart alone{"Of the cloth", "angle of the driver [deg]", "torque [N m]", {cloth}, {}, {}};
+    return inspect::encode_png(inspect::draw_charts({all, alone}, {1400, 560, 2}));
   }
 
   static Result<stage::Output> run(const Params& params, stage::Run& run) {
@@ -53,7 +67,12 @@ struct DriveStage {
     run.report("largest_cloth_torque", r.cloth_largest, "N*m");
     run.report("motor_work", r.motor_work, "J");
     run.report("cloth_work", r.cloth_work, "J");
-    return stage::Output{std::move(result->record), std::move(result->findings), {}};
+    stage::Output output{std::move(result->record), std::move(result->findings), {}};
+    if (!params.plot.empty()) {
+      TOILE_TRY(std::string png, chart(result->rows));
+      output.side_files.push_back({params.plot, std::move(png)});
+    }
+    return output;
   }
 };
 

@@ -216,6 +216,7 @@ class Drive {
     last_angle_ = state_.angle;
     outcome_.report.motor_largest = std::max(outcome_.report.motor_largest, std::abs(torque));
     outcome_.report.cloth_largest = std::max(outcome_.report.cloth_largest, std::abs(cloth_));
+    outcome_.rows.push_back({time, state_.angle, torque, cloth_, r.weight});
     outcome_.record += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{}\n", time, state_.angle, state_.rate, torque, cloth_, r.weight, r.inertia, 0.5 * r.inertia * state_.rate * state_.rate,
                                    outcome_.report.motor_work, outcome_.report.cloth_work, h, rounds);
   }

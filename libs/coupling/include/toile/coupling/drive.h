@@ -32,6 +32,7 @@ struct DriveParams {
   int rounds = 8;
   double tolerance = 1e-7;
   ChannelOptions couple;
+  std::string plot;
   static void describe(auto& f) {
     f(&DriveParams::motor, {.key = "motor", .doc = "prescribed: the driver is where `angles` say, and the torque for it is found; servo: the motor pulls towards them; torque: it has the torque of `torques`"});
     f(&DriveParams::times, {.key = "times", .doc = "times of the rows of `angles` and `torques`, increasing; the first is the beginning, the last the end", .unit = "s"});
@@ -49,6 +50,7 @@ struct DriveParams {
     f(&DriveParams::rounds, {.key = "rounds", .doc = "motors servo and torque: how often a step is repeated at most, until motion and reaction agree; 1: the reaction of the step before is taken", .min = 1, .max = 100});
     f(&DriveParams::tolerance, {.key = "tolerance", .doc = "they agree when the reaction would turn the driver no farther than this within the step", .unit = "rad", .min = 1e-15, .max = 1});
     f(&DriveParams::couple, {.key = "couple", .doc = "where the cloth is"});
+    f(&DriveParams::plot, {.key = "plot", .doc = "PNG of the torques of motor, cloth and weight against the angle; empty: none", .local = true});
     f.check([](const DriveParams& p, Issues& issues) {
       const auto bad = [&](const char* item, std::string what, const char* remedy) { issues.push_back(Issue{"bad_range", {.item = item}, std::move(what), remedy}); };
       if (p.times.size() < 2) bad("times", "the motion needs a beginning and an end", "give two times at least");
@@ -70,7 +72,14 @@ struct DriveReport {
   double motor_work = 0, cloth_work = 0;          ///< that motor and cloth did on the linkage [J]
 };
 
+/// At the end of a step that holds; torques on the driver.
+struct DriveRow {
+  double time = 0, angle = 0;               ///< [s, rad]
+  double motor = 0, cloth = 0, weight = 0;  ///< [N m]
+};
+
 struct DriveOutcome {
+  std::vector<DriveRow> rows;
   std::string record;  ///< CSV: time_s,angle_rad,rate_rad_s,motor_Nm,cloth_Nm,weight_Nm,inertia_kgm2,kinetic_J,motor_work_J,cloth_work_J,step_s,rounds
   DriveReport report;
   Issues findings;     ///< what ended it before its time
