@@ -74,6 +74,29 @@ TEST(references, bias_extension_and_frame) {
   EXPECT_NEAR((shear_energy(0.5 + h, 3) - shear_energy(0.5 - h, 3)) / (2 * h), 3 * 0.5 * std::cos(0.5), 1e-8);
 }
 
+TEST(references, bias_extension_of_yarns_that_stretch) {
+  // Yarns that hardly stretch: the closed solution. The easier they stretch, the less force.
+  const std::vector<double> angle{10, 20, 30, 40};
+  std::vector<double> extension, stiffer;
+  for (const double a : angle) {
+    const BiasPoint p = bias_extension(radians(a), 0.1, 0.05, 1);
+    extension.push_back(p.extension);
+    stiffer.push_back(p.force / 0.05);
+  }
+  for (const double ratio : {1e6, 1250.0, 350.0}) {
+    const std::vector<double> force = bias_extension_of_yarns(extension, 0.1, 0.05, ratio);
+    ASSERT_EQ(force.size(), angle.size());
+    for (std::size_t i = 0; i < angle.size(); ++i) {
+      if (ratio == 1e6) EXPECT_NEAR(force[i] / stiffer[i], 1, 0.002) << angle[i];
+      else EXPECT_LT(force[i], 0.97 * stiffer[i]) << ratio << " " << angle[i];
+    }
+    stiffer = force;
+  }
+  // On squares half as large and extrapolated from there: 0.2596, 0.5469, 0.8563, 1.1802 at C11/G = 350.
+  const std::array<double, 4> finer{0.2596, 0.5469, 0.8563, 1.1802};
+  for (std::size_t i = 0; i < angle.size(); ++i) EXPECT_NEAR(stiffer[i] / finer[i], 1, 0.002) << angle[i];
+}
+
 TEST(references, lateral_buckling) {
   // Values of a Ritz solution of degree 22 x 6 that estimates its own error at 0.3 %.
   const double table[][3] = {{0.05, 0.5, 18.75}, {0.1, 0.5, 19.35}, {0.2, 0.5, 20.64}, {0.3, 0.5, 22.03}, {0.5, 0.5, 24.96}, {1, 0.5, 32.52}, {0.1, 0.25, 14.07}, {0.5, 0.25, 19.99}};

@@ -223,8 +223,16 @@ TEST(Sheet, BendingEnergyOfQuadraticSurfacesIsExactOnAnyMesh) {
   fabric::Card card = shirting();
   card.twist_ratio = 0.3;
   const double d11 = card.weft.bending, d22 = card.warp.bending, d66 = 0.3 * std::sqrt(d11 * d22);
-  for (const fixtures::Net net : nets) {
-    const GarmentMesh g = fixtures::net(net, 12, 9, 0.12, 0.09, card, flat);
+  for (std::size_t mesh = 0; mesh <= nets.size(); ++mesh) {
+    // The last is a grid with a hole of other triangles around a particle out of its place: its corners see unequal numbers of cells.
+    const bool hole = mesh == nets.size();
+    const std::string name = hole ? "grid with a hole" : fixtures::name_of(nets[mesh]);
+    GarmentMesh g = fixtures::net(hole ? fixtures::Net::alternating : nets[mesh], 12, 9, 0.12, 0.09, card, flat);
+    if (hole) {
+      for (Eigen::Index v = 0; v < g.vertex_count(); ++v) {
+        if ((g.uv.row(v) - Eigen::RowVector2d(0.05, 0.04)).norm() < 1e-6) g.uv.row(v) += Eigen::RowVector2d(0.002, 0.0015);
+      }
+    }
     SheetOptions options;
     for (int v = 0; v < g.vertex_count(); ++v) {
       const double u = g.uv(v, 0), w = g.uv(v, 1);
@@ -237,7 +245,7 @@ TEST(Sheet, BendingEnergyOfQuadraticSurfacesIsExactOnAnyMesh) {
                                               Eigen::Vector3d(0, 1, c.vv * v + c.uv * u)};
       });
       const double exact = 0.5 * (d11 * c.uu * c.uu + d22 * c.vv * c.vv + 4 * d66 * c.uv * c.uv) * 0.12 * 0.09;
-      EXPECT_NEAR(energy(sheet, x, Points3(0, 3)).bending / exact, 1, 1e-8) << fixtures::name_of(net) << ", " << c.name;
+      EXPECT_NEAR(energy(sheet, x, Points3(0, 3)).bending / exact, 1, 1e-8) << name << ", " << c.name;
       // And it is in balance: no force from bending at nodes that are neither on the border nor next to a director.
       double worst = 0;
       for (int i = 0; i < sheet.cloth_nodes; ++i) {
@@ -248,7 +256,7 @@ TEST(Sheet, BendingEnergyOfQuadraticSurfacesIsExactOnAnyMesh) {
         }
         worst = std::max(worst, std::abs(force));
       }
-      EXPECT_LT(worst, 1e-9 * d11) << fixtures::name_of(net) << ", " << c.name;
+      EXPECT_LT(worst, 1e-9 * d11) << name << ", " << c.name;
     }
   }
 }

@@ -315,8 +315,9 @@ LinearForm Builder::derivative(int v, int axis) const {
   const Quarter &plus = quarter[static_cast<std::size_t>(2 * axis)], &minus = quarter[static_cast<std::size_t>(2 * axis + 1)];
   double weight_p = 1 / p, weight_q = 1 / q;
   if (plus.area > 0 && minus.area > 0) {
-    weight_p = plus.stiffness / (p * p);
-    weight_q = minus.stiffness / (q * q);
+    // By area: at a corner of the grid the sides have unequal numbers of cells, and the slope is still that of the surface.
+    weight_p *= plus.stiffness / plus.area;
+    weight_q *= minus.stiffness / minus.area;
   }
   chord(v, after, weight_p / (weight_p + weight_q));
   chord(before, v, weight_q / (weight_p + weight_q));

@@ -15,8 +15,9 @@ namespace toile::mechanics {
 namespace {
 
 constexpr std::size_t grain = 1024;
-// Part of a pair's stretch energy that either face keeps for itself, so that opposite stretches in the two are not free.
-constexpr double own_part = 0.1;
+// Part of a pair's stretch energy that either face keeps for itself, so that opposite stretches in the two are not free: as stiff as twice
+// the shear of the cloth, at most a tenth. A part of the stretch alone would lock the more, the easier the cloth shears.
+constexpr double own_over_shear = 2, most_own_part = 0.1;
 
 struct Triplet {
   int row, column;
@@ -175,14 +176,20 @@ fabric::CurvePoint shear_of_face(const Sheet& sheet, std::size_t f, double sine)
   const fabric::CurvePoint q = sheet.friction->shear[f].at(sheet.friction->laws[fabric].shear, sine);
   return {p.energy + q.energy, p.force + q.force, p.slope + q.slope};
 }
+/// What a face of a pair keeps of the stretch energy for itself: weft, warp.
+std::array<double, 2> own_part(const fabric::Constitutive& data) {
+  const auto part = [&](const fabric::TensileCurve& curve) { return std::min(most_own_part, own_over_shear * data.shear.rigidity / std::max(curve.slope_zero, 1e-12)); };
+  return {part(data.weft), part(data.warp)};
+}
 /// Weft and warp of a pair's mean.
 std::array<fabric::CurvePoint, 2> of_pair(const Sheet& sheet, std::size_t unit, const YarnState& mean) {
   const auto fabric = static_cast<std::size_t>(sheet.fabric_of_face[static_cast<std::size_t>(sheet.units[unit].first)]);
   const fabric::Constitutive& data = sheet.fabrics[fabric];
-  if (!sheet.friction) return {scaled(data.weft.at(mean.weft - 1), 1 - own_part), scaled(data.warp.at(mean.warp - 1), 1 - own_part)};
+  const auto [own_weft, own_warp] = own_part(data);
+  if (!sheet.friction) return {scaled(data.weft.at(mean.weft - 1), 1 - own_weft), scaled(data.warp.at(mean.warp - 1), 1 - own_warp)};
   const auto& sliders = sheet.friction->pair_stretch[unit];
   const InternalFriction::Law& law = sheet.friction->laws[fabric];
-  return {scaled(sliders[0].at(data.weft, law.loss_weft, mean.weft - 1), 1 - own_part), scaled(sliders[1].at(data.warp, law.loss_warp, mean.warp - 1), 1 - own_part)};
+  return {scaled(sliders[0].at(data.weft, law.loss_weft, mean.weft - 1), 1 - own_weft), scaled(sliders[1].at(data.warp, law.loss_warp, mean.warp - 1), 1 - own_warp)};
 }
 
 double half_height(const Sheet& sheet, const CurvatureForm& c) {
@@ -482,9 +489,10 @@ SheetEnergy energy(const Sheet& sheet, const Points3& x, const Points3& link_off
       const std::array<YarnState, 2> state{yarn_state(yarn_gradient(sheet, x, f)), yarn_state(yarn_gradient(sheet, x, g))};
       const YarnState mean = mean_state(sheet, unit, state[0], state[1]);
       const auto [weft, warp] = of_pair(sheet, u, mean);
+      const auto [own_weft, own_warp] = own_part(sheet.fabrics[static_cast<std::size_t>(sheet.fabric_of_face[f])]);
       for (std::size_t k = 0; k < 2; ++k) {
         const std::size_t h = k == 0 ? f : g;
-        sum += sheet.shapes[h].area * (own_part * (weft_of_face(sheet, h, state[k].weft).energy + warp_of_face(sheet, h, state[k].warp).energy) +
+        sum += sheet.shapes[h].area * (own_weft * weft_of_face(sheet, h, state[k].weft).energy + own_warp * warp_of_face(sheet, h, state[k].warp).energy +
                                        shear_of_face(sheet, h, state[k].sine).energy + weft.energy + warp.energy);
       }
     }
@@ -571,9 +579,10 @@ void evaluate(const Sheet& sheet, const Points3& x, const Points3& link_offset, 
       const YarnState mean = mean_state(sheet, unit, state[0], state[1]);
       const double area = sheet.shapes[faces[0]].area + sheet.shapes[faces[1]].area;
       const auto [weft, warp] = of_pair(sheet, u, mean);
+      const auto [part_weft, part_warp] = own_part(sheet.fabrics[static_cast<std::size_t>(sheet.fabric_of_face[f])]);
       for (std::size_t k = 0; k < 2; ++k) {
         // The pair's force pulls on either face; its slope couples the two and goes into the elements.
-        fabric::CurvePoint own_weft = scaled(weft_of_face(sheet, faces[k], state[k].weft), own_part), own_warp = scaled(warp_of_face(sheet, faces[k], state[k].warp), own_part);
+        fabric::CurvePoint own_weft = scaled(weft_of_face(sheet, faces[k], state[k].weft), part_weft), own_warp = scaled(warp_of_face(sheet, faces[k], state[k].warp), part_warp);
         own_weft.force += weft.force;
         own_warp.force += warp.force;
         own_weft.energy += weft.energy;

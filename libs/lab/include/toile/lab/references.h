@@ -52,6 +52,11 @@ struct BiasPoint {
 /// shear [rad], height > 2 width [m]; moment per area G gamma cos(gamma), shear stiffness G [N/m]
 BiasPoint bias_extension(double shear, double height, double width, double stiffness);
 
+/// The same for yarns that stretch, C11 = `ratio` times the shear stiffness: force over shear stiffness and width at extensions [m],
+/// increasing. A net of extensible yarns pinned at their crossings on the yarns' own squares, by Newton, extrapolated to fine squares
+/// (within 0.2 %). Precondition: height >= 2 width.
+std::vector<double> bias_extension_of_yarns(const std::vector<double>& extensions, double height, double width, double ratio);
+
 /// Energy per area of shear, G (g sin g + cos g - 1).
 double shear_energy(double shear, double stiffness);
 
