@@ -41,10 +41,11 @@ validate: tools
 
 bench: deps
 	@cmake --preset release -DTOILE_BENCH=ON
-	@cmake --build $(BUILD) --target tools pipeline_bench tailoring_bench placement_bench simulation_bench robustness_bench -j $(JOBS)
+	@cmake --build $(BUILD) --target tools pipeline_bench tailoring_bench mechanics_bench placement_bench simulation_bench robustness_bench -j $(JOBS)
 	@mkdir -p build/bench
 	@$(BUILD)/bench/pipeline_bench $(BUILD)/bin pipelines/tee/pipeline.yaml build/bench build/bench/report.json
 	@$(BUILD)/bench/tailoring_bench $(BUILD)/bin . build/bench/tailoring build/bench/report.json
+	@$(BUILD)/bin/mechanics_bench . build/bench/report.json
 	@$(BUILD)/bin/placement_bench . build/bench/report.json
 	@$(BUILD)/bench/simulation_bench $(BUILD)/bin . build/bench/simulation build/bench/report.json
 	@$(BUILD)/bench/robustness_bench $(BUILD)/bin . build/bench/robustness build/bench/report.json
