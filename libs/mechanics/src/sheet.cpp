@@ -692,11 +692,12 @@ void evaluate(const Sheet& sheet, const Points3& x, const Points3& link_offset, 
       const auto slot = static_cast<std::size_t>(k);
       const int part_end = sheet.block_part_start[slot + 1], pair_end = sheet.block_pair_start[slot + 1];
       if (sheet.block_part_start[slot] == part_end && sheet.block_pair_start[slot] == pair_end && !all && k != sheet.diagonal[i]) continue;
-      Block sum = Block::identity(static_cast<float>(sheet.constant_part[slot]));
+      // In double precision: stretch cancels in what bending is left with, and rounding of each addend is what kept fine strips with sliders from rest.
+      Eigen::Matrix3d sum = sheet.constant_part[slot] * Eigen::Matrix3d::Identity();
       for (int p = sheet.block_part_start[slot]; p < part_end; ++p) {
         const int item = sheet.block_part[static_cast<std::size_t>(p)], a = item % 9 / 3, b = item % 3;
         const Block& block = response.face_blocks[static_cast<std::size_t>(item / 9)][static_cast<std::size_t>(block_slot[static_cast<std::size_t>(a)][static_cast<std::size_t>(b)])];
-        sum += a <= b ? block : block.transposed();
+        sum += (a <= b ? block : block.transposed()).matrix();
       }
       if (sheet.block_pair_start[slot] < pair_end) {
         Eigen::Matrix3d pairs = Eigen::Matrix3d::Zero();
@@ -706,9 +707,9 @@ void evaluate(const Sheet& sheet, const Points3& x, const Points3& link_offset, 
           if (slope == 0) continue;  // a slider that slides
           pairs += slope * response.entry_gradient[static_cast<std::size_t>(first)] * response.entry_gradient[static_cast<std::size_t>(second)].transpose();
         }
-        sum += Block::from(pairs);
+        sum += pairs;
       }
-      matrix.value[slot] = sum;
+      matrix.value[slot] = Block::from(sum);
     }
   });
   response.constant_blocks_stand = true;
