@@ -54,6 +54,7 @@ struct SimulateStage {
     run.report("max_strain_warp", report.strain_warp_max);
     run.report("max_strain_weft", report.strain_weft_max);
     run.report("max_shear", report.shear_max, "rad");
+    if (report.lowest_stiffness) run.report("lowest_stiffness", *report.lowest_stiffness, "1/s2");
     run.report("contacts", report.contacts);
     run.report("least_gap", report.least_gap, "m");
     run.report("max_seam_gap", report.seam_gap_max, "m");

@@ -11,6 +11,7 @@
 #include "toile/dynamics/linear_solver.h"
 #include "toile/dynamics/provot.h"
 #include "toile/dynamics/rest_neighbours.h"
+#include "toile/dynamics/stability.h"
 #include "toile/mechanics/sheet.h"
 
 #include <fmt/format.h>
@@ -120,6 +121,7 @@ class Run {
   bool try_merge();
   bool relax();
   void equilibria();
+  void find_stability();
   void read_velocities();
   void find_resistance(const Points3& before, const Points3& velocity_before, bool first);
   void move_in_time();
@@ -844,6 +846,7 @@ void Run::record_row() {
     for (const auto& [name, selected] : watched_) {
       for (const char* axis : {"x", "y", "z"}) record_ += fmt::format(",{}.{}_m", name, axis);
     }
+    if (params_.stability) record_ += ",lowest_stiffness_per_s2";
     record_ += "\n";
   }
   record_ += fmt::format("{},{},{},{},{},{}", time_, static_residual(), response_.energy.membrane, response_.energy.bending, potential_, contact_sums_.energy);
@@ -859,6 +862,7 @@ void Run::record_row() {
     for (std::size_t k = 0; k < selected.vertices.size(); ++k) mean += selected.share[k] * x_.row(sheet_.node_of_vertex[selected.vertices[k]]).transpose();
     record_ += fmt::format(",{},{},{}", mean.x(), mean.y(), mean.z());
   }
+  if (params_.stability) record_ += fmt::format(",{}", report_.lowest_stiffness.value_or(0));
   record_ += "\n";
 }
 
@@ -993,6 +997,67 @@ bool Run::relax() {
   return false;
 }
 
+/// The smallest stiffness at x_, with its evaluation at hand before and after. Second derivatives are differences of gradients, so that all
+/// forces count as they are; the projected matrix of the iterations is the preconditioner.
+void Run::find_stability() {
+  constexpr double way = 1e-6;    // of the differences [m]
+  constexpr double shift = 1;     // what nothing holds has no stiffness [1/s2]
+  constexpr double held_stiffness = 1e8;
+  const auto free_part = [&](Points3& v) {
+    for (Eigen::Index i = 0; i < v.rows(); ++i) {
+      const int holder = holder_[static_cast<std::size_t>(i)];
+      if (holder >= 0) v.row(i) = fixed_[static_cast<std::size_t>(i)] ? Eigen::RowVector3d(0, 0, 0) : Eigen::RowVector3d(v.row(i) - v.row(i) * held_[static_cast<std::size_t>(holder)].directions);
+    }
+  };
+  StiffnessProblem problem;
+  problem.mass = sheet_.mass;
+  for (Eigen::Index i = 0; i < problem.mass.size(); ++i) {
+    if (!(problem.mass[i] > 0)) problem.mass[i] = 1e-12;  // of a director
+  }
+  increment_start_ = x_;
+  start_ = x_;
+  evaluate(x_, true);
+  const std::vector<ContactTerm> terms = terms_;
+  BlockMatrix matrix = response_.matrix;
+  for (std::size_t i = 0; i < holder_.size(); ++i) {
+    Block& d = matrix.value[static_cast<std::size_t>(matrix.diagonal[i])];
+    for (int c = 0; c < 3; ++c) d.column[c][c] += static_cast<float>(shift * problem.mass[static_cast<Eigen::Index>(i)] + (fixed_[i] ? held_stiffness : 0));
+    if (holder_[i] >= 0 && !fixed_[i]) d = Block::from(d.matrix() + held_stiffness * held_[static_cast<std::size_t>(holder_[i])].directions);
+  }
+  LinearSolver solver;
+  solver.factor(matrix, terms, x_, fixed_);
+  problem.precondition = [&](const Points3& given, Points3& out) {
+    Points3 r = given;
+    free_part(r);
+    const double scale = std::max(r.cwiseAbs().maxCoeff(), 1e-300);
+    std::vector<Float4> b(static_cast<std::size_t>(r.rows())), y;
+    for (Eigen::Index i = 0; i < r.rows(); ++i) {
+      const Eigen::Vector3d row = r.row(i).transpose() / scale;
+      b[static_cast<std::size_t>(i)] = mechanics::load3(row.data());
+    }
+    solver.solve(matrix, terms, b, y, {.tolerance = 1e-3, .max_iterations = 3000});
+    out.resize(r.rows(), 3);
+    for (Eigen::Index i = 0; i < r.rows(); ++i) out.row(i) = scale * vector(y[static_cast<std::size_t>(i)]).transpose();
+    free_part(out);
+  };
+  const Points3 at = x_;
+  problem.stiffness = [&](const Points3& v, Points3& out) {
+    const double part = way / std::max(v.rowwise().norm().maxCoeff(), 1e-300);
+    evaluate(at + part * v, false);
+    out = gradient_;
+    evaluate(at - part * v, false);
+    out = (out - gradient_) / (2 * part);
+    free_part(out);
+  };
+  const LowestStiffness lowest = lowest_stiffness(problem);
+  report_.lowest_stiffness = lowest.value;
+  if (!lowest.converged) {
+    findings_.push_back(Issue{"stability_not_converged", {.item = fmt::format("time {} s", time_)}, fmt::format("the smallest stiffness is not found to its tolerance after {} iterations; {:.6g} /s2 is above it", lowest.iterations, lowest.value),
+                              "coarser cells, or leave stability out", Category::not_converged});
+  }
+  evaluate(x_, true);
+}
+
 /// Equilibria at equal parts of the duration, one after the other.
 void Run::equilibria() {
   gravity_part_ = 1;
@@ -1004,6 +1069,7 @@ void Run::equilibria() {
     if (by_increment_ && !friction_.empty()) friction_ = follow_friction(friction_, x_, contacts_, x_, support_x_, sheet_.area, laws_, true);
     if (!relax()) report_.converged = false;
     if (by_increment_) friction_ = update_friction(friction_, increment_start_, contacts_, x_, support_x_, sheet_.area, laws_);
+    if (params_.stability) find_stability();
     record_row();
     // Within an increment friction between yarns is a potential: where it leads does not depend on the iterations.
     mechanics::advance_friction(sheet_, x_);

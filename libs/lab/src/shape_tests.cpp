@@ -25,28 +25,29 @@ std::string common(Model model, double residual, int iterations) {
 
 Experiment buckling(const Scope& scope) {
   Experiment e{.test = "lateral_buckling", .title = "Lateral buckling",
-               .about = "A strip of 200 mm stands on edge, clamped at one end, its weight in its plane; from Γ* = w L³/D11 on it tips over sideways ([Romero 2021](bibliography.md#romero2021)). Its end is pushed sideways by a small force at 80, "
-                        "85, 90 and 94 % of the reference; force over deflection, a function of Γ² since the strip buckles for either direction of gravity, is extrapolated to zero by a parabola. Reference: Rayleigh-Ritz, plate of degree 15 × 5 on plane stress of degree 14 × 7 (`libs/lab`)."};
+               .about = "A strip of 200 mm stands on edge, clamped at one end, its weight in its plane; from Γ* = w L³/D11 on it tips over sideways ([Romero 2021](bibliography.md#romero2021)). In its plane it comes to rest at 97 and 103 % of the reference; the smallest "
+                        "stiffness of these equilibria against mass (`stability`), a function of Γ² since the strip buckles for either direction of gravity, is zero at Γ* on the straight line through both. Pushing it sideways, as was done before, does not do: cloth as stiff in its plane as this resists a twist "
+                        "of 0.1 mm already. Reference: Rayleigh-Ritz, plate of degree 15 × 5 on plane stress of degree 14 × 7 (`libs/lab`). Without Poisson's ratio in bending, which `woven` does not have."};
   struct Key {
     Strip strip;
     Cloth cloth;
     double reference = 0;
   };
   std::vector<Key> keys;
-  const std::vector<double> parts{0.80, 0.85, 0.90, 0.94};
-  if (scope.woven && !scope.quick) {
-    for (const auto& [aspect, twist] : {std::pair{0.05, 0.5}, {0.2, 0.5}, {0.5, 0.5}, {1.0, 0.5}, {0.2, 0.25}}) {
+  const std::vector<double> parts{0.97, 1.03};
+  if (scope.woven) {
+    for (const auto& [aspect, twist] : {std::pair{0.05, 0.5}, {0.2, 0.5}, {0.5, 0.5}, {1.0, 0.5}, {0.2, 0.25}, {0.2, 0.1}}) {
       for (const Net net : {Net::grid, Net::jittered}) {
         if (net != Net::grid && aspect != 0.2) continue;
+        if (scope.quick && (net != Net::grid || aspect != 0.2 || twist != 0.25)) continue;
         Key k{{.length = 0.2, .width = 0.2 * aspect, .warp = 0, .cell = aspect < 0.1 ? 0.0025 : aspect < 0.4 ? 0.005 : 0.01, .net = net},
               {.force_max = 1000, .b_warp = 2e-4, .b_weft = 2e-4, .g = 5e4, .twist = twist}, lateral_buckling(aspect, twist)};
         k.cloth.weight = k.reference * k.cloth.b_warp / (earth * std::pow(k.strip.length, 3));
-        const double push = 0.0135 * k.cloth.b_warp * k.strip.width / std::pow(k.strip.length, 2);
-        std::string spec = common(Model::woven, 2e-7, 6000) + fmt::format("gravity_direction: {}\ngravity_times: [0 s", vector_yaml(-across(k.strip)));
+        std::string spec = common(Model::woven, 1e-3, 6000) + fmt::format("stability: true\ngravity_direction: {}\ngravity_times: [0 s", vector_yaml(-across(k.strip)));
         for (std::size_t i = 0; i < parts.size(); ++i) spec += fmt::format(", {} s", i + 1);
         spec += "]\ngravity_factor: [0";
         for (const double p : parts) spec += fmt::format(", {}", p);
-        spec += fmt::format("]\nincrements: {0}\nduration: {0} s\nwatch: [strip.tip]\nconstraints:\n  - {{name: clamp, on: [strip.clamp], kind: clamp}}\nloads:\n  - {{name: side, on: [strip.tip], force: [0 N, 0 N, {1} N]}}\n", parts.size(), format_number(push));
+        spec += fmt::format("]\nincrements: {0}\nduration: {0} s\nconstraints:\n  - {{name: clamp, on: [strip.clamp], kind: clamp}}\n", parts.size());
         e.cases.push_back(strip_case(fmt::format("woven_{}_{}_{}", k.strip.file_name(), aspect, twist), k.strip, k.cloth, spec));
         keys.push_back(k);
       }
@@ -59,19 +60,10 @@ Experiment buckling(const Scope& scope) {
       Row row = row_of("lateral_buckling", fmt::format("w/L = {}, D66/D11 = {}", format_number(std::round(100 * k.strip.width / k.strip.length) / 100), k.cloth.twist), Model::woven, name_of(k.strip.net), "Γ*", "1", outcomes[i]);
       row.reference = k.reference;
       row.target = 0.02;
-      if (outcomes[i].ran && row_count(outcomes[i].record) == parts.size()) {
-        // Parabola of 1/z over the square of the load by least squares; its root beyond the last load.
-        Eigen::MatrixXd a(parts.size(), 3);
-        Eigen::VectorXd b(parts.size());
-        const double unit = watched(outcomes[i].record, "strip.tip", 0).z();
-        for (std::size_t n = 0; n < parts.size(); ++n) {
-          const double q = parts[n] * parts[n];
-          a.row(static_cast<Eigen::Index>(n)) << 1, q, q * q;
-          b[static_cast<Eigen::Index>(n)] = unit / watched(outcomes[i].record, "strip.tip", n).z();
-        }
-        const Eigen::Vector3d c = a.colPivHouseholderQr().solve(b);
-        const double root = (-c[1] - std::sqrt(c[1] * c[1] - 4 * c[2] * c[0])) / (2 * c[2]);
-        row.value = k.reference * std::sqrt(root);
+      const auto column = outcomes[i].record.find("lowest_stiffness_per_s2");
+      if (outcomes[i].ran && column != outcomes[i].record.end() && column->second.size() == parts.size()) {
+        const double a = parts[0] * parts[0], b = parts[1] * parts[1], low = column->second[0], high = column->second[1];
+        row.value = k.reference * std::sqrt(a + (b - a) * low / (low - high));
       }
       section.rows.push_back(row);
     }

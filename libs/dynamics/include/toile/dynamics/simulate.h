@@ -62,6 +62,7 @@ struct SimulationParams {
   std::vector<LoadSpec> loads;
   std::vector<std::string> watch;
   std::string record;
+  bool stability = false;
   std::string log;
 
   static void describe(auto& f) {
@@ -114,6 +115,7 @@ struct SimulationParams {
     f(&SimulationParams::loads, {.key = "loads", .doc = "forces on edges, points and regions"});
     f(&SimulationParams::watch, {.key = "watch", .doc = "edges, points and panels whose mean position the record has"});
     f(&SimulationParams::record, {.key = "record", .doc = "CSV file with one row per increment or time step: paths, reaction forces and moments, watched positions, energies; empty: none", .local = true});
+    f(&SimulationParams::stability, {.key = "stability", .doc = "equilibrium: find the smallest stiffness against mass at the end of each increment, the square of the lowest angular frequency, for summary and record; negative: the equilibrium is unstable"});
     f(&SimulationParams::log, {.key = "log", .doc = "CSV file with one row per iteration: energies, residual, contacts, strains; empty: none", .local = true});
     f.check([](const SimulationParams& p, Issues& issues) {
       const auto table = [&](const char* item, const std::vector<double>& times, const std::vector<double>& values) {
@@ -126,6 +128,7 @@ struct SimulationParams {
       table("wind_factor", p.wind_times, p.wind_factor);
       const auto bad = [&](const char* item, const char* what, const char* remedy) { issues.push_back({"bad_combination", {.item = item}, what, remedy}); };
       if (p.integrator == Integrator::provot && p.increments > 1) bad("increments", "integrator provot runs through paths and loads in one piece", "leave increments at 1");
+      if (p.stability && (p.mode != Mode::equilibrium || p.integrator == Integrator::provot)) bad("stability", "equilibria of the implicit integrator have a stability", "leave it out, or write `mode: equilibrium` without integrator provot");
       if (p.integrator == Integrator::bdf2 && p.mode != Mode::motion) bad("integrator", "bdf2 is for motion", "write `mode: motion`, or integrator implicit");
       const bool wind = p.wind[0] != 0 || p.wind[1] != 0 || p.wind[2] != 0 || p.wind_drag.value_or(0) > 0 || p.wind_lift.value_or(0) > 0;
       if ((wind || p.damping_mass > 0 || p.damping_stiffness > 0) && (p.mode != Mode::motion || p.integrator == Integrator::provot)) {
@@ -175,6 +178,7 @@ struct SimulationReport {
   double simulated_time = 0;      ///< motion [s]
   double membrane_energy = 0, bending_energy = 0, potential_energy = 0, contact_energy = 0;  ///< [J]
   double strain_warp_max = 0, strain_weft_max = 0, strain_warp_99 = 0, strain_weft_99 = 0, shear_max = 0;
+  std::optional<double> lowest_stiffness;  ///< against mass, of the last equilibrium [1/s2]
   int contacts = 0;
   double least_gap = 0;           ///< [m]
   double seam_gap_max = 0;        ///< before merging; 0 once all are closed [m]
