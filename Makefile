@@ -8,7 +8,7 @@ help:
 	@echo 'make tee      install what is missing, build, and make a T-shirt: pattern -> garment at rest on a dress form'
 	@echo 'make skirt    the same for a skirt with darts'
 	@echo 'make trousers the same for a pair of trousers, on a dress form with legs'
-	@echo 'make jacket   a man'"'"'s jacket, from pattern to shell and lined jacket, put on a dress form (not yet draped)'
+	@echo 'make jacket   a man'"'"'s jacket, shell and lined jacket put on a dress form, the shell buttoned and at rest'
 	@echo 'make waistcoat   the same of a waistcoat'
 	@echo 'make softtop  a convertible'"'"'s soft top, from the drawing of its frame to rest on the closed frame (not yet opened)'
 	@echo 'make test     build and run all tests'

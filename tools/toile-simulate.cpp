@@ -14,7 +14,7 @@ struct SimulateStage {
 
   static stage::Description description() {
     return {.name = "toile-simulate",
-            .version = 14,
+            .version = 15,
             .summary = "Lets a placed garment hang to rest on a body, or move in time.",
             .example = "toile-simulate placed.ply --support form.ply -o draped.ply",
             .details = "Open seams are drawn together first; then the garment relaxes until the sum of all net forces is a given part of its "
@@ -59,6 +59,11 @@ struct SimulateStage {
     run.report("least_gap", report.least_gap, "m");
     run.report("max_seam_gap", report.seam_gap_max, "m");
     run.report("open_seam_pairs", report.seams_open);
+    for (const dynamics::ClosureState& c : report.closures) {
+      run.report(fmt::format("closed_{}", c.name), c.closed == c.halves);
+      run.report(fmt::format("gap_{}", c.name), c.gap, "m");
+      run.report(fmt::format("pull_{}", c.name), c.force, "N");
+    }
     run.report("self_intersections", report.intersections);
     run.report("support_intersections", report.support_intersections);
     run.report("penetrating_vertices", report.inside);

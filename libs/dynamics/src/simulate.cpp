@@ -8,6 +8,7 @@
 #include "toile/dynamics/air.h"
 #include "toile/dynamics/constraints.h"
 #include "toile/dynamics/contact_force.h"
+#include "toile/dynamics/fastening.h"
 #include "toile/dynamics/linear_solver.h"
 #include "toile/dynamics/provot.h"
 #include "toile/dynamics/rest_neighbours.h"
@@ -20,6 +21,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <set>
 
@@ -58,6 +60,8 @@ constexpr double solved_well = 0.25;  // part of the net force left after one it
 constexpr double neighbourhood = 1.5;
 // A held particle is where its path wants it [m].
 constexpr double at_target = 1e-9;
+// Sides of a seam whose pull is limited are led so far in a step of the closing [m].
+constexpr double closing_move = 2e-3;
 
 /// Node ids: vertices whose welds are closed share one.
 Ids node_ids(const GarmentMesh& garment, const std::vector<char>& weld_closed) {
@@ -119,6 +123,10 @@ class Run {
   Reaction reaction(std::size_t constraint) const;
   void close_seams();
   bool try_merge();
+  bool advance_fasteners();
+  void apply_fasteners();
+  double seam_pull() const;
+  bool limit_links();
   bool relax();
   void equilibria();
   void find_stability();
@@ -132,6 +140,7 @@ class Run {
   void record_row();
   void set_time(double time);
   void check_end();
+  void check_closures();
   GarmentMesh output() const;
 
   const GarmentMesh& garment_;
@@ -199,6 +208,8 @@ class Run {
   Points3 gradient_;      // static: without inertia
   contact::Contacts contacts_;
   RestNeighbours rest_neighbours_;
+  Fastening fastening_;
+  double link_pull_ = std::numeric_limits<double>::infinity();  // greatest pull of an open seam now [N]
   std::vector<contact::Contact> self_contacts_;
   ContactSums contact_sums_;
   double energy_ = 0, friction_energy_ = 0, potential_ = 0;
@@ -296,6 +307,7 @@ Issues Run::build(const Ids& node_of_vertex) {
     particle_ = std::move(*particle);
     particle_response_ = {};
   }
+  apply_fasteners();
   response_ = {};
   solver_ = {};
   mesh::Triangles faces(garment_.face_count(), 3);
@@ -872,6 +884,30 @@ double widest_link(const Sheet& sheet, const Points3& x) {
   return widest;
 }
 
+/// Brings offsets so near to the gaps that there are that no link pulls harder than `pull` [N].
+void limit_pull(Points3& offset, const std::vector<mechanics::Link>& links, const Points3& x, double pull) {
+  for (std::size_t i = 0; i < links.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    const Eigen::RowVector3d gap = x.row(links[i].a) - x.row(links[i].b), lead = offset.row(row) - gap;
+    const double most = pull / links[i].stiffness, length = lead.norm();
+    if (length > most) offset.row(row) = gap + most / length * lead;
+  }
+}
+
+/// Greatest pull on a particle of an open seam [N].
+double Run::seam_pull() const {
+  if (params_.seam_pull) return *params_.seam_pull;
+  if (garment_.free_layers.empty()) return std::numeric_limits<double>::infinity();
+  return 0.5 * laws_.self.reach * laws_.self.stiffness * sheet_.area.sum() / sheet_.cloth_nodes;
+}
+
+/// Open seams pull no harder than they may from here. True when one that is open has to be held back.
+bool Run::limit_links() {
+  if (sheet_.links.empty() || !std::isfinite(link_pull_)) return false;
+  limit_pull(link_offset_, sheet_.links, x_, link_pull_);
+  return true;
+}
+
 /// Makes the two sides of every seam one when all are near enough and the way there is free.
 bool Run::try_merge() {
   if (widest_link(sheet_, x_) > params_.seam_gap) return false;
@@ -890,6 +926,19 @@ bool Run::try_merge() {
   return true;
 }
 
+/// A step is over: fasteners are drawn further together, or held with what it takes. True when their pull is another now.
+bool Run::advance_fasteners() {
+  if (fastening_.empty() || !fastening_.advance(scatter(x_, sheet_.node_of_vertex))) return false;
+  apply_fasteners();
+  return true;
+}
+
+void Run::apply_fasteners() {
+  if (fastening_.empty()) return;
+  fastening_.apply(sheet_);
+  if (particle_) fastening_.apply(*particle_);
+}
+
 void Run::close_seams() {
   if (sheet_.links.empty()) return;
   gravity_part_ = params_.closing_gravity;
@@ -897,20 +946,35 @@ void Run::close_seams() {
   step_ = params_.time_step;
   inertia_rate_.setConstant(1 / (step_ * step_));
   inertia_ = start_ = x_;
-  const int limit = params_.closing_steps * 5;
+  link_pull_ = seam_pull();
+  const auto scale_links = [&](double factor) {
+    mechanics::scale_links(sheet_, factor);
+    response_.constant_blocks_stand = false;
+    if (particle_) mechanics::scale_links(*particle_, factor);
+  };
+  // A limited pull leads as far as a step is to move the sides; the softer, the farther.
+  double stiffness = params_.seam_stiffness;
+  if (link_pull_ < closing_move * stiffness) {
+    scale_links(link_pull_ / (closing_move * stiffness));
+    stiffness = link_pull_ / closing_move;
+  }
+  const int limit = params_.closing_steps * (std::isfinite(link_pull_) ? 15 : 5);
   for (int i = 1; i <= limit && !interrupted(); ++i) {
     const double part = std::max(0.0, 1 - static_cast<double>(i) / params_.closing_steps);
     link_offset_ = part * link_start_;
     // Sides that do not meet by now are pulled harder and harder.
-    if (i > params_.closing_steps + 5) {
-      mechanics::scale_links(sheet_, 1.25);
-      response_.constant_blocks_stand = false;
-      if (particle_) mechanics::scale_links(*particle_, 1.25);
+    if (i > params_.closing_steps + 5 && stiffness * params_.seam_gap < 2 * link_pull_) {
+      scale_links(1.25);
+      stiffness *= 1.25;
+    } else if (i > params_.closing_steps + 5 && last_move_ < quiet_move && link_pull_ < 50 * seam_pull()) {
+      link_pull_ *= 1.25;  // at rest and still open: it takes more
     }
+    limit_links();
     evaluate(x_, true);
     iterate();
     log_row("closing");
     accept();
+    advance_fasteners();
     const double widest = widest_link(sheet_, x_);
     report_.seam_gap_max = widest;
     if (hooks_.progress) hooks_.progress(0.2 * i / limit, fmt::format("closing seams, gap {:.1f} mm", 1e3 * widest));
@@ -944,11 +1008,12 @@ bool Run::relax() {
   last_total_ = 1e300;
   inertia_ = start_ = x_;
   link_offset_.setZero();
+  limit_links();
   evaluate(x_, true);
   double before = static_residual(), best = before;
   int stalled = 0;
   // The state may be at rest already, after an increment without any change.
-  if (report_.iterations > 0 && before <= params_.residual && held_error() <= at_target) return true;
+  if (report_.iterations > 0 && before <= params_.residual && held_error() <= at_target && fastening_.settled()) return true;
   for (int i = 0; i < params_.max_iterations && !interrupted(); ++i) {
     inertia_rate_.setConstant(1 / (step_ * step_));
     iterate();
@@ -969,7 +1034,10 @@ bool Run::relax() {
       hooks_.progress(std::clamp(0.2 + 0.8 * std::log(residual / 10) / std::log(params_.residual / 10), 0.2, 1.0), fmt::format("iteration {}, residual {:.2e}", report_.iterations, residual));
     }
     const bool arrived = held_error() <= at_target;
-    if (residual <= params_.residual && arrived) return true;
+    if (residual <= params_.residual && arrived && fastening_.settled()) return true;
+    link_offset_.setZero();
+    const bool held_back = limit_links();
+    if (advance_fasteners() || held_back) evaluate(x_, true);
     // How well one iteration solved its step: what is left of the step's own net force.
     const double left = last_left_ / before;
     before = residual;
@@ -1192,6 +1260,7 @@ void Run::move_in_time() {
     mark();
     mechanics::advance_friction(sheet_, x_);  // the sheet's second derivative changes with it, and the energy's zero
     friction_ = update_friction(friction_, start_, contacts_, x_, support_x_, sheet_.area, laws_);
+    if (advance_fasteners()) evaluate(x_, true);
     report_.simulated_time = (i + 1) * step_;
     log_row("moving");
     record_row();
@@ -1247,6 +1316,8 @@ Issues Run::integrate_explicitly() {
   gravity_part_ = 1;
   link_offset_.setZero();
   const bool rest = params_.mode == Mode::equilibrium;
+  fastening_.hold();
+  apply_fasteners();
   if (!rest) read_velocities();
   if (!(sheet_.mass.minCoeff() > 0)) {
     return {Issue{"no_mass", {}, "a particle has no mass; explicit integration needs one", "give the cloth its fabric (toile-layer), or use the implicit integrator"}};
@@ -1453,6 +1524,21 @@ void Run::check_end() {
   }
 }
 
+/// What closed, and what could not be.
+void Run::check_closures() {
+  report_.closures = fastening_.states(garment_, scatter(x_, sheet_.node_of_vertex));
+  std::erase_if(report_.closures, [](const ClosureState& c) { return c.halves == 0; });
+  for (const ClosureState& c : report_.closures) {
+    const std::string item = c.kind + " " + c.name;
+    if (c.closed < c.halves) {
+      findings_.push_back(Issue{"not_closed", {.item = item}, fmt::format("{}did not close: its halves are {:.1f} mm apart, {:.1f} mm were asked for", c.halves == 1 ? "" : fmt::format("{} of {} pairs ", c.halves - c.closed, c.halves), 1e3 * c.gap, 1e3 * c.length),
+                                "place its halves nearer together, raise fastening_pull, or leave it open (toile-layer, `open`)", Category::check});
+    } else if (c.turned > 0) {
+      findings_.push_back(Issue{"closed_wrongly", {.item = item}, "the second half lies under the first", "exchange its halves, or place the one that is to lie on top outside (docs/placement.md)", Category::check});
+    }
+  }
+}
+
 GarmentMesh Run::output() const {
   GarmentMesh result = garment_;
   result.x = scatter(x_, sheet_.node_of_vertex);
@@ -1499,6 +1585,12 @@ Result<SimulationOutcome> Run::go() {
   }
   laws_.self = {params_.self_reach.value_or(std::max(thickest, 8e-4)), params_.contact_stiffness, params_.friction.value_or(friction), 1};
   laws_.support = {params_.support_reach, params_.contact_stiffness, params_.support_friction, 1};
+  FasteningOptions fastening;
+  fastening.steps = params_.closing_steps;
+  fastening.pull = params_.fastening_pull;
+  fastening.thickness = laws_.self.reach;
+  fastening_ = Fastening(garment_, garment_.x, fastening);
+  apply_fasteners();
 
   clear_start();
   close_seams();
@@ -1527,6 +1619,7 @@ Result<SimulationOutcome> Run::go() {
   for (Eigen::Index i = 0; i < gradient_.rows(); ++i) report_.residual_max = std::max(report_.residual_max, net_force(i, gradient_.row(i)));
   for (std::size_t c = 0; c < held_.size(); ++c) report_.reactions.push_back(reaction(c));
   check_end();
+  check_closures();
   if (interrupted()) {
     findings_.push_back(Issue{"interrupted", {}, "stopped before the end; the state so far is written", "run again", Category::interrupted});
   } else if (!report_.converged) {

@@ -139,7 +139,8 @@ Categories regions(const mesh::SupportMesh& support) {
   return result;
 }
 
-/// Buttons, hooks, snaps and teeth as small balls on the cloth's face; those of open fasteners are lighter.
+/// Buttons, hooks, snaps and teeth as small balls on the cloth's face; those of open fasteners are lighter. Where the halves of a closed one
+/// lie on each other it is drawn once, at the half that lies on top.
 /// shown  which vertices' halves are drawn
 std::vector<Surface> fastener_balls(const mesh::GarmentMesh& g, const mesh::Points3& x, const std::function<bool(int)>& shown) {
   // An octahedron whose faces are cut into four, twice.
@@ -167,8 +168,9 @@ std::vector<Surface> fastener_balls(const mesh::GarmentMesh& g, const mesh::Poin
     const double radius = std::min(fastener.kind == mesh::Fastener::Kind::zip ? 0.002 : 0.007, 0.02 * extent);
     Surface& surface = balls[fastener.closed ? 0 : 1];
     surface.kind = Surface::Kind::support;
+    const bool together = fastener.closed && (x.row(fastener.a) - x.row(fastener.b)).norm() < std::max(fastener.length, radius) + 2e-3;
     for (const int v : {fastener.a, fastener.b}) {
-      if (!shown(v)) continue;
+      if (!shown(v) || (together && v == fastener.a)) continue;
       const int base = static_cast<int>(surface.x.size());
       const Vector3d centre = x.row(v);
       for (const Vector3d& corner : corners) {

@@ -395,7 +395,9 @@ Result<ParticleModel> make_particle(const mesh::GarmentMesh& garment, const Ids&
   }
   for (const mesh::Fastener& fastener : garment.fasteners) {
     const int a = node(fastener.a), b = node(fastener.b);
-    if (a != b && fastener.closed) push_spring(a, b, fastener.stiffness > 0 ? fastener.stiffness : options.fastener_stiffness, fastener.length, false);
+    const bool pulls = a != b && fastener.closed;
+    m.fastener_spring.push_back(pulls ? static_cast<int>(m.springs.size()) : -1);
+    if (pulls) push_spring(a, b, fastener.stiffness > 0 ? fastener.stiffness : options.fastener_stiffness, fastener.length, true);
   }
 
   // Edges that are bent at rest, or stiffer.

@@ -323,9 +323,11 @@ Result<Sheet> make_sheet(const mesh::GarmentMesh& garment, const Ids& node_of_ve
       seam_factor[{std::min(a, before), std::max(a, before)}] = garment.seams[static_cast<std::size_t>(weld.seam)].bending_factor;
     }
   }
-  for (const mesh::Fastener& fastener : garment.fasteners) {
+  for (std::size_t i = 0; i < garment.fasteners.size(); ++i) {
+    const mesh::Fastener& fastener = garment.fasteners[i];
     const int a = node_of_vertex[fastener.a], b = node_of_vertex[fastener.b];
-    if (a != b) sheet.springs.push_back({a, b, options.fastener_stiffness, fastener.length});
+    if (a == b || !fastener.closed) continue;
+    sheet.springs.push_back({a, b, fastener.stiffness > 0 ? fastener.stiffness : options.fastener_stiffness, fastener.length, static_cast<int>(i)});
   }
 
   // Directors: a length of about the cells around keeps their columns of the matrix in proportion.
@@ -524,7 +526,7 @@ SheetEnergy energy(const Sheet& sheet, const Points3& x, const Points3& link_off
     result.links += 0.5 * link.stiffness * (x.row(link.a) - x.row(link.b) - link_offset.row(static_cast<Eigen::Index>(i))).squaredNorm();
   }
   for (const Spring& spring : sheet.springs) {
-    const double stretch = (x.row(spring.a) - x.row(spring.b)).norm() - spring.length;
+    const double stretch = std::max((x.row(spring.a) - x.row(spring.b)).norm() - spring.length, 0.0);
     result.links += 0.5 * spring.stiffness * stretch * stretch;
   }
   return result;
@@ -643,7 +645,7 @@ void evaluate(const Sheet& sheet, const Points3& x, const Points3& link_offset, 
     const Spring& spring = sheet.springs[i - links];
     const Eigen::RowVector3d d = x.row(spring.a) - x.row(spring.b);
     const double length = std::max(d.norm(), 1e-12);
-    return sign * spring.stiffness * (1 - spring.length / length) * d;
+    return sign * spring.stiffness * std::max(1 - spring.length / length, 0.0) * d;
   };
   response.energy.bending = parallel_reduce(static_cast<std::size_t>(sheet.node_count), grain, 0.0, [&](std::size_t begin, std::size_t end) {
     double sum = 0;
@@ -673,7 +675,7 @@ void evaluate(const Sheet& sheet, const Points3& x, const Points3& link_offset, 
     response.energy.links += 0.5 * link.stiffness * (x.row(link.a) - x.row(link.b) - link_offset.row(static_cast<Eigen::Index>(i))).squaredNorm();
   }
   for (const Spring& spring : sheet.springs) {
-    const double stretch = (x.row(spring.a) - x.row(spring.b)).norm() - spring.length;
+    const double stretch = std::max((x.row(spring.a) - x.row(spring.b)).norm() - spring.length, 0.0);
     response.energy.links += 0.5 * spring.stiffness * stretch * stretch;
   }
   if (!curvature) return;
@@ -716,6 +718,7 @@ void evaluate(const Sheet& sheet, const Points3& x, const Points3& link_offset, 
   for (const Spring& spring : sheet.springs) {
     const Eigen::Vector3d d = point(x, spring.a) - point(x, spring.b);
     const double length = std::max(d.norm(), 1e-12);
+    if (length <= spring.length) continue;
     const Eigen::Matrix3d along = d * d.transpose() / (length * length);
     const double across = std::max(1 - spring.length / length, 0.0);
     const Block h = Block::from(spring.stiffness * (along + across * (Eigen::Matrix3d::Identity() - along)));

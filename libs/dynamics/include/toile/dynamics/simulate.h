@@ -4,6 +4,7 @@
 #include "toile/base/fields.h"
 #include "toile/base/result.h"
 #include "toile/dynamics/constraints.h"
+#include "toile/dynamics/fastening.h"
 #include "toile/mechanics/particle.h"
 #include "toile/mesh/garment_mesh.h"
 #include "toile/mesh/support_mesh.h"
@@ -54,7 +55,9 @@ struct SimulationParams {
   int closing_steps = 20;
   double closing_gravity = 0.1;
   double seam_stiffness = 500;
+  std::optional<double> seam_pull;
   double seam_gap = 5e-4;
+  double fastening_pull = 5;
   double largest_move = 0.02;
   std::vector<std::string> fixed;
   std::vector<ConstraintSpec> constraints;
@@ -107,6 +110,8 @@ struct SimulationParams {
     f(&SimulationParams::closing_steps, {.key = "closing_steps", .doc = "steps in which open seams are drawn together", .min = 1, .max = 10000});
     f(&SimulationParams::closing_gravity, {.key = "closing_gravity", .doc = "part of gravity that acts while seams are open", .unit = "1", .min = 0, .max = 1});
     f(&SimulationParams::seam_stiffness, {.key = "seam_stiffness", .doc = "pull on the two sides of a seam while it is open, per particle and distance", .unit = "N/m", .min = 1, .max = 1e6});
+    f(&SimulationParams::seam_pull, {.key = "seam_pull", .doc = "greatest pull on a particle of a seam while it is open; not given: none without free layers, with them what presses cloth together to half of `self_reach`", .unit = "N", .min = 1e-6, .max = 1e6});
+    f(&SimulationParams::fastening_pull, {.key = "fastening_pull", .doc = "greatest pull on the halves of a button, hook, snap or tooth while they are drawn together", .unit = "N", .min = 1e-4, .max = 1e4});
     f(&SimulationParams::seam_gap, {.key = "seam_gap", .doc = "distance at which the two sides of a seam become one", .unit = "m", .min = 1e-6, .max = 0.01});
     f(&SimulationParams::largest_move, {.key = "largest_move", .doc = "equilibrium: no particle moves farther in one iteration", .unit = "m", .min = 1e-4, .max = 1});
     f(&SimulationParams::fixed, {.key = "fixed", .doc = "edges and points (panel.edge, panel.point) that are held where they are; short for a constraint of kind pin"});
@@ -190,6 +195,7 @@ struct SimulationReport {
   int start_left = 0;             ///< intersections of the start that could not be undone
   std::vector<Untangling> untangled;  ///< panels that untangling the start moved
   double start_move = 0;          ///< farthest that a particle was pushed out of the support at the start [m]
+  std::vector<ClosureState> closures;  ///< that were to be closed
   int intersections = 0, support_intersections = 0, inside = 0;  ///< at the end, by the exact test
 };
 

@@ -58,6 +58,8 @@ struct ParticleModel {
   } springs;  ///< along yarns, then on the strip's edges, then trims and fasteners
   std::size_t cloth_springs = 0;  ///< those of the cloth itself come first
 
+  std::vector<int> fastener_spring;  ///< of each fastener of the garment: index into springs, or -1
+
   struct Cells {
     std::vector<std::array<int, 4>> node;  ///< 00, 10, 01, 11: first digit along u
     std::vector<double> weight;            ///< G area / 4, of each corner [N m]

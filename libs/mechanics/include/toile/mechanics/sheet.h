@@ -30,11 +30,12 @@ struct Link {
   double stiffness = 0;  ///< [N/m]
 };
 
-/// Energy stiffness/2 (|x_a - x_b| - length)^2: a closed button.
+/// Energy stiffness/2 (|x_a - x_b| - length)^2 where it is longer than that, else none: a closed button pulls and does not push.
 struct Spring {
   int a = 0, b = 0;
   double stiffness = 0;  ///< [N/m]
-  double length = 0;     ///< [m]
+  double length = 0;     ///< may be negative: it pulls at no distance too [m]
+  int fastener = -1;     ///< index into the garment's fasteners
 };
 
 /// Energy stiffness/2 (angle - rest)^2 of two triangles on an edge.
