@@ -109,6 +109,8 @@ CantileverCase cantilever_case(double gamma, double warp, Net net, int cells, Mo
   // Isotropic off the yarns, so that the strip's own stiffness is B there too; light loads on stiffer cloth.
   const double b = gamma < 1 ? 2e-4 : 2e-5;
   c.cloth = {.b_warp = b, .b_weft = warp == 45 ? b : 0.6 * b, .twist = warp == 45 ? 0.5 : 0.3};
+  // On the bias it stretches by shear, at G = 40 by a per cent under its weight at 1000; the elastica does not stretch.
+  if (warp == 45) c.cloth.g = 400;
   const double own = warp == 90 ? c.cloth.b_weft : c.cloth.b_warp;
   c.cloth.weight = gamma * own / (earth * std::pow(c.strip.length, 3));
   return c;
@@ -122,7 +124,7 @@ Experiment cantilevers(const Scope& scope) {
   Experiment e{.test = "cantilever", .title = "Cantilever",
                .about = "A strip of 80 × 15 mm, clamped level, bends under its weight; Γ = w L³/B. Drop over reach of the free end against the heavy elastica "
                         "([Peirce 1930](bibliography.md#peirce1930), [Romero 2021](bibliography.md#romero2021)), integrated here (`libs/lab`, Runge-Kutta from the free end). Warp along the strip (0°), across it (90°, B 0.6 times), on the bias "
-                        "(45°, B alike and twist ratio 0.5: isotropic, so that the elastica holds). 64 cells along it, 128 at Γ = 1000, where 64 would be half of the length L/√Γ over which it bends: a chain of turning angles is then 1.2 % "
+                        "(45°, B alike and twist ratio 0.5: isotropic, so that the elastica holds, and G ten times as large, so that it does not stretch). 64 cells along it, 128 at Γ = 1000, where 64 would be half of the length L/√Γ over which it bends: a chain of turning angles is then 1.2 % "
                         "too soft, one that bends by its chords, as this energy does, 2.5 %. `particle` has no tangent planes at clamps and holds two rows of particles: its first joint has a whole cell instead of half of one."};
   struct Key {
     CantileverCase c;
