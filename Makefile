@@ -10,7 +10,7 @@ help:
 	@echo 'make trousers the same for a pair of trousers, on a dress form with legs'
 	@echo 'make jacket   a man'"'"'s jacket, shell and lined jacket put on a dress form, the shell buttoned and at rest'
 	@echo 'make waistcoat   the same of a waistcoat'
-	@echo 'make softtop  a convertible'"'"'s soft top, from the drawing of its frame to rest on the closed frame (not yet opened)'
+	@echo 'make softtop  a convertible'"'"'s soft top, from the drawing of its frame to rest on the closed frame and open in a second'
 	@echo 'make test     build and run all tests'
 	@echo 'make validate   the virtual laboratory: tests of textiles and shells against theory, report in build/validation'
 	@echo 'make bench    time the tee stage by stage, cutting, sewing and layering of up to a million triangles, placement,'

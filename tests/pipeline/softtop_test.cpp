@@ -60,3 +60,18 @@ TEST(softtop, hangs_on_its_closed_frame) {
   // About the published size: 4,481 triangles.
   EXPECT_NEAR(fit["faces"].get<int>(), 4481, 0.02 * 4481);
 }
+
+TEST(softtop, opens_with_its_frame) {
+  const Folder folder("opened");
+  ASSERT_EQ(folder.run("toile", "run " + source("pipelines/softtop/pipeline.yaml") + " opened_fit --build build"), 0) << folder.log();
+  const auto fit = nlohmann::json::parse(checked(io::read_file(folder.file("build/softtop/opened_fit.json"))));
+  EXPECT_EQ(fit["penetrating_vertices"], 0);
+  EXPECT_EQ(fit["self_intersections"], 0);
+  EXPECT_EQ(fit["support_intersections"], 0);
+  EXPECT_LT(fit["max_strain_warp"].get<double>(), 0.04);
+  EXPECT_LT(fit["max_strain_weft"].get<double>(), 0.04);
+  // The motor first lifts the cloth, then carries it.
+  ASSERT_EQ(folder.run("toile", "run " + source("pipelines/softtop/pipeline.yaml") + " torque --build build"), 0) << folder.log();
+  EXPECT_GT(checked(io::read_file(folder.file("build/softtop/torque.csv"))).size(), 1000u);
+  EXPECT_TRUE(fs::exists(folder.file("build/softtop/torque.png")));
+}

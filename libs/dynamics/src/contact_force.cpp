@@ -42,7 +42,7 @@ std::array<int, 4> cloth_only(const Contact& c) {
 }
 
 Eigen::Vector3d relative_motion(const FrictionPair& pair, const Points3& start, const Points3& x) {
-  Eigen::Vector3d motion = Eigen::Vector3d::Zero();
+  Eigen::Vector3d motion = pair.support_motion;
   for (std::size_t k = 0; k < 4; ++k) {
     if (pair.node[k] >= 0) motion += pair.weight[k] * (x.row(pair.node[k]) - start.row(pair.node[k])).transpose();
   }
@@ -111,6 +111,14 @@ ContactSums add_repulsion(const contact::Contacts& contacts, const Points3& x, c
   return sums;
 }
 
+Eigen::Vector3d friction_force(const FrictionPair& pair, const Points3& start, const Points3& x) {
+  if (pair.limit <= 0) return Eigen::Vector3d::Zero();
+  const Eigen::Matrix3d tangent = Eigen::Matrix3d::Identity() - pair.normal * pair.normal.transpose();
+  const Eigen::Vector3d slip = pair.slip + tangent * relative_motion(pair, start, x);
+  const double length = slip.norm();
+  return length * pair.stiffness < pair.limit ? Eigen::Vector3d(pair.stiffness * slip) : Eigen::Vector3d(pair.limit / length * slip);
+}
+
 double add_friction(const std::vector<FrictionPair>& pairs, const Points3& start, const Points3& x, Points3& gradient, std::vector<ContactTerm>* terms) {
   double energy = 0;
   for (const FrictionPair& pair : pairs) {
@@ -176,6 +184,9 @@ std::vector<FrictionPair> present_pairs(Follow way, const std::vector<FrictionPa
     pair.a = c.a;
     pair.b = c.b;
     pair.node = cloth_only(c);
+    if (c.kind > Kind::edge_edge) {
+      for (std::size_t k = 0; k < 4; ++k) pair.support_node[k] = pair.node[k] >= 0 ? -1 : c.node[k];
+    }
     pair.weight = c.weight;
     pair.normal = gap / distance;
     pair.slip = Eigen::Vector3d::Zero();

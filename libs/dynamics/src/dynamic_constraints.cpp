@@ -97,7 +97,10 @@ ConstraintReport DynamicConstraints::add_forces(const ConstraintSet& set, const 
   for (auto* row : {&rhs_, &r_, &z_, &p_, &q_, &diagonal_}) row->resize(n);
   rows_.resize(n);
   active_.assign(n, 1);
-  if (n == 0) return report;
+  if (n == 0) {
+    friction_.clear();
+    return report;
+  }
   if (inverse_mass_.size() != mass.size()) {
     push_ = Points3::Zero(mass.size(), 3);
     is_touched_.assign(static_cast<std::size_t>(mass.size()), 0);
@@ -134,7 +137,7 @@ ConstraintReport DynamicConstraints::add_forces(const ConstraintSet& set, const 
   }
   for (const Unilateral& c : set.contacts) {
     rows_[k] = {};
-    double d = -c.offset, rate = 0;
+    double d = -c.offset, rate = -c.offset_rate;
     for (std::size_t j = 0; j < 4; ++j) {
       if (c.node[j] < 0 || c.weight[j] == 0) continue;
       rows_[k].node[j] = c.node[j];
@@ -222,6 +225,7 @@ ConstraintReport DynamicConstraints::add_forces(const ConstraintSet& set, const 
     is_touched_[static_cast<std::size_t>(i)] = 0;
   }
 
+  friction_.assign(set.contacts.size(), Eigen::Vector3d::Zero());
   // Friction: what would stop the sliding in one step, at most the cone. A node in several contacts shares it among them.
   if (report.active_contacts > 0) {
     for (std::size_t row = first_contact_; row < n; ++row) {
@@ -234,7 +238,7 @@ ConstraintReport DynamicConstraints::add_forces(const ConstraintSet& set, const 
       const std::size_t row = first_contact_ + c;
       const Unilateral& contact = set.contacts[c];
       if (lambda_[row] <= 0 || contact.friction <= 0) continue;
-      Eigen::Vector3d slide = Eigen::Vector3d::Zero();
+      Eigen::Vector3d slide = contact.surface_velocity;
       double inverse = 0;
       int shared = 1;
       for (std::size_t j = 0; j < 4; ++j) {
@@ -249,6 +253,7 @@ ConstraintReport DynamicConstraints::add_forces(const ConstraintSet& set, const 
       if (speed < 1e-300) continue;
       const double stop = speed / (inverse * options.time_step * shared), most = contact.friction * lambda_[row];
       const Eigen::Vector3d friction = -std::min(stop, most) / speed * slide;
+      friction_[c] = friction;
       for (std::size_t j = 0; j < 4; ++j) {
         if (rows_[row].node[j] >= 0) force.row(rows_[row].node[j]) += contact.weight[j] * friction.transpose();
       }

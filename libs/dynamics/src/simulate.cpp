@@ -15,6 +15,9 @@
 #include "toile/dynamics/stability.h"
 #include "toile/mechanics/sheet.h"
 
+#include "archive.h"
+#include "moving_support.h"
+
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
@@ -24,6 +27,7 @@
 #include <limits>
 #include <map>
 #include <set>
+#include <utility>
 
 namespace toile::dynamics {
 namespace {
@@ -62,6 +66,11 @@ constexpr double neighbourhood = 1.5;
 constexpr double at_target = 1e-9;
 // Sides of a seam whose pull is limited are led so far in a step of the closing [m].
 constexpr double closing_move = 2e-3;
+// Supports in motion: a time step that does not end is halved, so many times at most.
+constexpr int halvings_max = 10;
+constexpr double carried_slack = 1e-12;  // rise of the energy while a support goes on, in heights of the weight: above rounding [m]
+constexpr double carried_solver_tolerance = 1e-3;  // what goes with a support goes far: a twentieth of that would be in its way
+constexpr int shared_limits = 6;  // rounds in which cloth and support are slowed down together
 
 /// Node ids: vertices whose welds are closed share one.
 Ids node_ids(const GarmentMesh& garment, const std::vector<char>& weld_closed) {
@@ -101,6 +110,16 @@ class Run {
   Result<SimulationOutcome> go();
 
  private:
+  struct Progress;
+  struct Held {
+    ConstraintSpec spec;
+    Selected selected;
+    Eigen::Vector3d centre = Eigen::Vector3d::Zero();      // of its particles at the start
+    Eigen::Matrix3d directions = Eigen::Matrix3d::Identity();  // projection on those that are held
+    int body = -1;                                         // whose motion it follows
+    std::vector<int> nodes;                                // that follow it, with the ghosts of its directors
+  };
+
   void phase(const char* name) const {
     if (hooks_.phase) hooks_.phase(name);
   }
@@ -127,14 +146,25 @@ class Run {
   void apply_fasteners();
   double seam_pull() const;
   bool limit_links();
-  bool relax();
-  void equilibria();
+  bool relax(Progress& progress);
+  Issues equilibria();
   void find_stability();
   void read_velocities();
   void find_resistance(const Points3& before, const Points3& velocity_before, bool first);
-  void move_in_time();
+  Issues move_in_time();
+  Issues begin_motion();
+  void support_at(const Points3& x, double part);
+  Motion held_motion(const Held& held) const;
+  Points3 limit(const Points3& from, const Points3& target, const Points3& support_from, Points3& support_target);
+  Eigen::RowVector3d holding_force(int node) const;
+  std::vector<BodyWrench> wrenches() const;
+  void report_squeezed(double time);
+  void store(Archive& archive, Progress& progress);
+  void leave_checkpoint(Progress& progress);
+  void show_frame(double time);
   Issues integrate_explicitly();
   void list_contacts(const Points3& x, ConstraintSet& set);
+  void move_contacts(ConstraintSet& set, double step) const;
   void find_contacts(const Points3& x, contact::Radii radii);
   void log_row(const char* phase_name);
   void record_row();
@@ -157,6 +187,17 @@ class Run {
   std::optional<contact::Search> search_;
   contact::Surface support_surface_;
   Points3 support_x_ = no_points;
+  MovingSupport moving_;
+  std::vector<BodyWrench> wrenches_;  // of the cloth on the bodies at the end of the last step
+  struct SupportContact {
+    std::size_t index;  // in the set
+    contact::Contact contact;
+  };
+  std::vector<SupportContact> support_contacts_;  // explicit integration: of a support that moves
+  int stuck_node_ = -1;               // that was held back most at the last limit
+  double support_part_ = 1;           // of its way in the step that it has gone
+  double limit_part_ = 1;             // of the way that the last limit left to the support
+  bool in_step_ = false;              // gradient_ and inertia_ are those of a time step
   ContactLaws laws_;
   double weight_ = 0;
 
@@ -182,13 +223,6 @@ class Run {
   BlockMatrix damping_;
   std::vector<FrictionPair> friction_;
   std::vector<std::uint8_t> self_exempt_, support_exempt_;
-  struct Held {
-    ConstraintSpec spec;
-    Selected selected;
-    Eigen::Vector3d centre = Eigen::Vector3d::Zero();      // of its particles at the start
-    Eigen::Matrix3d directions = Eigen::Matrix3d::Identity();  // projection on those that are held
-    std::vector<int> nodes;                                // that follow it, with the ghosts of its directors
-  };
   std::vector<Held> held_;
   struct Load {
     LoadSpec spec;
@@ -202,6 +236,8 @@ class Run {
   std::vector<char> fixed_;    // |nodes|: all directions held
   Points3 hold_start_;         // |nodes|: where held nodes were at the start
   std::string record_;
+  std::string resume_;           // state to go on from; empty: none
+  double next_frame_ = 0;        // [s]
 
   // of the last evaluation
   mechanics::SheetResponse response_;
@@ -221,6 +257,24 @@ class Run {
   double promised_ = 0;   // what the last direction promised to take off the energy of the step [J]
   double last_total_ = 1e300, last_left_ = 0, last_move_ = 0, last_fraction_ = 1, last_alpha_ = 1;
   std::vector<Float4> rhs_, direction_, given_, product_;
+};
+
+/// The checkpoint is none, or of another run.
+Issue damaged_checkpoint() {
+  return {"bad_checkpoint", {.item = "resume"}, "is damaged, or was left by another version", "begin again without `resume`"};
+}
+
+/// Where in its loops a run is.
+struct Run::Progress {
+  int step = 0;  // motion: time steps done; equilibrium: increments done
+  // motion
+  double time = 0, next_step = 0, last_step = 0;
+  int passed = 0;
+  Points3 before = no_points, velocity_before = no_points;
+  std::vector<char> touched, touching;
+  // equilibrium
+  int iteration = 0, stalled = 0;
+  double residual = 0, best = 0;
 };
 
 /// (matrix + terms) * x.
@@ -399,11 +453,21 @@ void Run::set_time(double time) {
   }
 }
 
+/// Where a held place is to be now.
+Motion Run::held_motion(const Held& held) const {
+  if (held.body < 0) return motion_at(held.spec, held.centre, time_);
+  const BodyPose pose = moving_.since_beginning(held.body, moving_.next());
+  Motion motion;
+  motion.turn = pose.rotation.toRotationMatrix();
+  motion.move = pose.shift;
+  return motion;
+}
+
 /// How far each held node has to go to where its path wants it now; zero for the others.
 std::vector<Float4> Run::prescribed() const {
   std::vector<Float4> move(static_cast<std::size_t>(sheet_.node_count), Float4{});
   for (const Held& held : held_) {
-    const Motion motion = motion_at(held.spec, held.centre, time_);
+    const Motion motion = held_motion(held);
     for (int node : held.nodes) {
       const Eigen::Vector3d d = held.directions * (motion(hold_start_.row(node).transpose()) - x_.row(node).transpose());
       move[static_cast<std::size_t>(node)] = mechanics::load3(d.data());
@@ -415,7 +479,7 @@ std::vector<Float4> Run::prescribed() const {
 double Run::held_error() const {
   double largest = 0;
   for (const Held& held : held_) {
-    const Motion motion = motion_at(held.spec, held.centre, time_);
+    const Motion motion = held_motion(held);
     for (int node : held.nodes) largest = std::max(largest, (held.directions * (motion(hold_start_.row(node).transpose()) - x_.row(node).transpose())).norm());
   }
   return largest;
@@ -447,6 +511,7 @@ Issues Run::find_constraints() {
     Held held;
     held.spec = spec;
     held.selected = std::move(*selected);
+    if (!spec.body.empty()) held.body = moving_.body(spec.body);
     if (spec.normal) {
       const Eigen::Vector3d n = Eigen::Vector3d(spec.normal->data()).normalized();
       held.directions = n * n.transpose();
@@ -673,7 +738,17 @@ bool Run::iterate() {
   const std::vector<Float4> given = prescribed();
   bool driven = false;
   for (const Float4& d : given) driven = driven || d[0] != 0 || d[1] != 0 || d[2] != 0;
+  const bool carried = moving_.moves() && support_x_ != moving_.end();
+  driven = driven || carried;
   const std::vector<Float4> force = rhs_;
+  if (carried) {
+    // What touches the support goes with it.
+    const Points3 push = support_push(contacts_.support, friction_, 1 - support_part_, start_, x_, support_x_, moving_.end(), no_points, sheet_.area, laws_).gradient;
+    for (std::size_t i = 0; i < n; ++i) {
+      const Eigen::Vector3d f = push.row(static_cast<Eigen::Index>(i)).transpose();
+      rhs_[i] -= mechanics::load3(f.data());
+    }
+  }
   if (driven) {
     multiply(response_.matrix, terms_, given, product_);
     for (std::size_t i = 0; i < n; ++i) rhs_[i] -= product_[i];
@@ -711,6 +786,7 @@ bool Run::iterate() {
   const auto inertia_energy = [&](const Points3& x) {
     return 0.5 * (x - inertia_).cwiseProduct(sheet_.mass.cwiseProduct(inertia_rate_).asDiagonal() * (x - inertia_)).sum();
   };
+  const double contact_before = contact_sums_.energy;
   const double before = energy_ + inertia_energy(x_), scale_of_slack = force_scale();
   phase("solve");
   const bool in_time = params_.mode == Mode::motion && inertia_rate_[0] > 0 && sheet_.links.empty();
@@ -724,7 +800,7 @@ bool Run::iterate() {
       direction_[i] = holder_[i] < 0 ? mechanics::load3(d.data()) : Float4{};
     }
   }
-  solve_report_ = solver_.solve(response_.matrix, terms_, rhs_, direction_, {.tolerance = in_time ? motion_tolerance : tolerance_, .max_iterations = solver_iterations_max, .from_x = in_time});
+  solve_report_ = solver_.solve(response_.matrix, terms_, rhs_, direction_, {.tolerance = carried ? carried_solver_tolerance : (in_time ? motion_tolerance : tolerance_), .max_iterations = solver_iterations_max, .from_x = in_time});
   report_.solver_iterations += solve_report_.iterations;
   promised_ = 0;
   for (std::size_t i = 0; i < n; ++i) promised_ += 0.5 * vector(direction_[i]).dot(vector(rhs_[i]));
@@ -742,6 +818,11 @@ bool Run::iterate() {
   if (driven) {
     multiply(undriven, terms_, direction_, product_);
     for (std::size_t i = 0; i < n; ++i) work += vector(direction_[i]).dot(0.5 * vector(product_[i]) - vector(force[i]));
+    if (carried) {
+      Points3 move(x_.rows(), 3);
+      for (std::size_t i = 0; i < n; ++i) move.row(static_cast<Eigen::Index>(i)) = vector(direction_[i]).transpose();
+      work += support_push(contacts_.support, friction_, 1 - support_part_, start_, x_, support_x_, moving_.end(), move, sheet_.area, laws_).energy;
+    }
     work = 2 * std::max(work, 0.0);
   }
   double largest = 0;
@@ -756,28 +837,31 @@ bool Run::iterate() {
   if (driven && scale == 1) {
     // To the last digit.
     for (const Held& held : held_) {
-      const Motion motion = motion_at(held.spec, held.centre, time_);
+      const Motion motion = held_motion(held);
       for (int node : held.nodes) target.row(node) += (held.directions * (motion(hold_start_.row(node).transpose()) - target.row(node).transpose())).transpose();
     }
   }
-  contact::LimitOptions options;
-  options.self_exempt = self_exempt_;
-  options.support_exempt = support_exempt_;
-  const contact::StepLimit& limit = search_->limit_step(x_, target, support_x_, support_x_, options);
-  last_fraction_ = limit.least_fraction;
-  Points3 reached = limit.x;
+  const Points3 from = x_, support_from = support_x_;
+  const double part_from = support_part_;
+  Points3 support_reached = carried ? (scale == 1 ? moving_.end() : Points3(support_from + scale * (moving_.end() - support_from))) : support_x_;
+  const Points3 support_target = support_reached;
+  Points3 reached = limit(from, target, support_from, support_reached);
   // The straight way to `reached` is free of intersections, so every point on it is.
   double alpha = 1;
-  const Points3 from = x_;
   bool moved = false;
   const auto shorten = [&](int trials, bool take_last) {
     alpha = 1;
     for (int trial = 0; trial < trials; ++trial, alpha *= 0.5) {
       const Points3 candidate = alpha == 1 ? reached : Points3(from + alpha * (reached - from));
+      if (carried) {
+        const double gone = alpha * scale * limit_part_;
+        support_at(alpha == 1 ? support_reached : Points3(support_from + alpha * (support_reached - support_from)), gone == 1 ? 1 : part_from + gone * (1 - part_from));
+      }
       evaluate(candidate, true);
-      const double after = energy_ + inertia_energy(candidate);
+      // What a support does in contacts as it goes on is its work.
+      const double after = energy_ - (carried ? std::max(0.0, contact_sums_.energy - contact_before) : 0.0) + inertia_energy(candidate);
       const double part = std::min(1.0, alpha * scale * largest / slack_move);
-      moved = after <= before + slack_ * part * part * part * part * scale_of_slack + work || (take_last && trial + 1 == trials);
+      moved = after <= before + slack_ * part * part * part * part * scale_of_slack + work + carried_slack * (carried ? scale_of_slack : 0.0) || (take_last && trial + 1 == trials);
       if (moved) {
         x_ = candidate;
         return;
@@ -791,11 +875,19 @@ bool Run::iterate() {
     shorten(last_fraction_ < 1 ? 2 : 8, false);
     if (!moved && last_fraction_ < 1) {
       phase("limit");
-      const double part = 0.9 * search_->step_fraction(from, target, support_x_, support_x_, options);
-      reached = search_->limit_step(from, from + part * (target - from), support_x_, support_x_, options).x;
+      contact::LimitOptions options;
+      options.self_exempt = self_exempt_;
+      options.support_exempt = support_exempt_;
+      const double part = 0.9 * search_->step_fraction(from, target, support_from, support_target, options);
+      support_reached = carried ? Points3(support_from + part * (support_target - support_from)) : support_from;
+      reached = limit(from, from + part * (target - from), support_from, support_reached);
+      limit_part_ *= part;
       shorten(8, false);
     }
-    if (!moved) evaluate(x_, true);
+    if (!moved) {
+      if (carried) support_at(support_from, part_from);
+      evaluate(x_, true);
+    }
   }
   last_alpha_ = alpha;
   const Points3 left = gradient_ + sheet_.mass.cwiseProduct(inertia_rate_).asDiagonal() * (x_ - inertia_);
@@ -804,6 +896,39 @@ bool Run::iterate() {
   last_left_ /= force_scale();
   last_move_ = (x_ - from).rowwise().norm().maxCoeff();
   return moved;
+}
+
+/// The support on its way through a step, and with it what friction has seen of it.
+void Run::support_at(const Points3& x, double part) {
+  support_x_ = x;
+  support_part_ = part;
+  for (FrictionPair& pair : friction_) pair.support_motion = part * pair.support_way;
+}
+
+/// Ends of the straight ways from -> target that touch nothing. Where cloth cannot get out of a support's way, all are slowed down, the support too.
+Points3 Run::limit(const Points3& from, const Points3& target, const Points3& support_from, Points3& support_target) {
+  contact::LimitOptions options;
+  options.self_exempt = self_exempt_;
+  options.support_exempt = support_exempt_;
+  const bool moves = support_target != support_from;
+  double part = 1;
+  for (int round = 0;; ++round) {
+    const Points3 end = part == 1 ? target : Points3(from + part * (target - from));
+    const Points3 support_end = part == 1 ? support_target : Points3(support_from + part * (support_target - support_from));
+    const contact::StepLimit& limited = search_->limit_step(from, end, support_from, support_end, options);
+    last_fraction_ = std::min(part, limited.least_fraction);
+    if (moves && limited.limited_nodes > 0) stuck_node_ = static_cast<int>(std::min_element(limited.fraction.begin(), limited.fraction.end()) - limited.fraction.begin());
+    limit_part_ = part * limited.support_fraction;
+    if (!moves || limited.support_fraction == 1) {
+      support_target = support_end;
+      return limited.x;
+    }
+    if (round + 1 == shared_limits) {
+      support_target = support_from + limited.support_fraction * (support_end - support_from);
+      return limited.x;
+    }
+    part *= limited.support_fraction;
+  }
 }
 
 /// The step is over: friction takes note, the next step starts here.
@@ -834,6 +959,24 @@ void Run::log_row(const char* phase_name) {
                       contact_sums_.least_gap, solve_report_.iterations, solve_report_.reduction, last_move_, last_fraction_, last_alpha_);
 }
 
+/// What it takes to hold a node on its way.
+Eigen::RowVector3d Run::holding_force(int node) const {
+  if (!in_step_) return gradient_.row(node);
+  return gradient_.row(node) + sheet_.mass[node] * inertia_rate_[node] * (x_.row(node) - inertia_.row(node));
+}
+
+/// Of the cloth on the bodies, at the end of a step and before friction takes note of it.
+std::vector<BodyWrench> Run::wrenches() const {
+  if (!moving_.moves()) return {};
+  std::vector<BodyWrench> result(moving_.bodies().size());
+  moving_.add_contact_wrenches(contacts_.support, friction_, start_, x_, support_x_, sheet_.area, laws_, result);
+  for (const Held& held : held_) {
+    if (held.body < 0) continue;
+    for (int node : held.nodes) moving_.add_force(held.body, x_.row(node).transpose(), -held.directions * holding_force(node).transpose(), result);
+  }
+  return result;
+}
+
 Reaction Run::reaction(std::size_t constraint) const {
   const Held& held = held_[constraint];
   Reaction r{held.spec.name};
@@ -841,7 +984,7 @@ Reaction Run::reaction(std::size_t constraint) const {
   for (int v : held.selected.vertices) centre += x_.row(sheet_.node_of_vertex[v]).transpose();
   centre /= static_cast<double>(held.selected.vertices.size());
   for (int node : held.nodes) {
-    const Eigen::Vector3d force = held.directions * gradient_.row(node).transpose();
+    const Eigen::Vector3d force = held.directions * holding_force(node).transpose();
     r.force += force;
     r.moment += (x_.row(node).transpose() - centre).cross(force);
   }
@@ -859,6 +1002,11 @@ void Run::record_row() {
       for (const char* axis : {"x", "y", "z"}) record_ += fmt::format(",{}.{}_m", name, axis);
     }
     if (params_.stability) record_ += ",lowest_stiffness_per_s2";
+    if (moving_.moves()) {
+      for (const std::string& name : moving_.bodies()) {
+        for (const char* what : {"at_x_m", "at_y_m", "at_z_m", "force_x_N", "force_y_N", "force_z_N", "torque_x_Nm", "torque_y_Nm", "torque_z_Nm"}) record_ += fmt::format(",{}.{}", name, what);
+      }
+    }
     record_ += "\n";
   }
   record_ += fmt::format("{},{},{},{},{},{}", time_, static_residual(), response_.energy.membrane, response_.energy.bending, potential_, contact_sums_.energy);
@@ -875,7 +1023,70 @@ void Run::record_row() {
     record_ += fmt::format(",{},{},{}", mean.x(), mean.y(), mean.z());
   }
   if (params_.stability) record_ += fmt::format(",{}", report_.lowest_stiffness.value_or(0));
+  for (std::size_t b = 0; b < wrenches_.size(); ++b) {
+    for (const Eigen::Vector3d& v : {moving_.now().poses[b].shift, wrenches_[b].force, wrenches_[b].torque}) record_ += fmt::format(",{},{},{}", v.x(), v.y(), v.z());
+  }
   record_ += "\n";
+}
+
+/// All that a run remembers, both ways.
+void Run::store(Archive& a, Progress& p) {
+  std::uint64_t version = 1, nodes = static_cast<std::uint64_t>(sheet_.node_count), links = sheet_.links.size();
+  const std::uint64_t expected = version;
+  a(version);
+  a(nodes);
+  a(links);
+  TOILE_CHECK(version == expected && nodes == static_cast<std::uint64_t>(sheet_.node_count) && links == sheet_.links.size(), "a checkpoint of version {} for {} nodes and {} links", version, nodes, links);
+  a(p.step), a(p.time), a(p.next_step), a(p.last_step), a(p.passed), a(p.before), a(p.velocity_before), a(p.touched), a(p.touching);
+  a(p.iteration), a(p.stalled), a(p.residual), a(p.best);
+  a(x_), a(velocity_), a(start_), a(increment_start_), a(inertia_), a(hold_start_), a(support_x_);
+  a(step_), a(momentum_), a(tolerance_), a(slack_), a(last_total_), a(last_left_), a(last_move_), a(last_fraction_), a(last_alpha_), a(promised_), a(next_frame_), a(stuck_node_);
+  for (Held& held : held_) a(held.centre);
+  std::uint64_t pairs = friction_.size();
+  a(pairs);
+  if (a.reading()) friction_.assign(a.good() && pairs < (1u << 30) ? pairs : 0, FrictionPair{});
+  for (FrictionPair& f : friction_) {
+    a(f.kind), a(f.a), a(f.b), a(f.node), a(f.weight), a(f.normal), a(f.slip), a(f.limit), a(f.stiffness), a(f.support_node), a(f.support_way), a(f.support_motion), a(f.fresh);
+  }
+  a(self_exempt_), a(support_exempt_);
+  std::uint64_t wrenches = wrenches_.size();
+  a(wrenches);
+  if (a.reading()) wrenches_.assign(a.good() && wrenches < (1u << 20) ? wrenches : 0, BodyWrench{});
+  for (BodyWrench& w : wrenches_) a(w.force), a(w.torque);
+  SimulationReport& r = report_;
+  a(r.converged), a(r.iterations), a(r.solver_iterations), a(r.simulated_time), a(r.seam_gap_max), a(r.seams_open), a(r.rejected_steps), a(r.unconverged_steps);
+  a(r.start_inside), a(r.start_intersections), a(r.start_left), a(r.start_move);
+  std::uint64_t untangled = r.untangled.size();
+  a(untangled);
+  if (a.reading()) r.untangled.assign(a.good() && untangled < (1u << 20) ? untangled : 0, Untangling{});
+  for (Untangling& u : r.untangled) a(u.panel), a(u.moved), a(u.largest_move);
+  std::uint64_t findings = findings_.size();
+  a(findings);
+  if (a.reading()) findings_.assign(a.good() && findings < (1u << 20) ? findings : 0, Issue{});
+  for (Issue& i : findings_) a(i.code), a(i.place.item), a(i.what), a(i.remedy), a(i.category);
+  a(log_), a(record_);
+}
+
+void Run::leave_checkpoint(Progress& progress) {
+  if (!hooks_.checkpoint) return;
+  if (!sheet_.links.empty()) {
+    if (std::none_of(findings_.begin(), findings_.end(), [](const Issue& issue) { return issue.code == "no_checkpoint"; })) {
+      findings_.push_back(Issue{"no_checkpoint", {.item = "checkpoint"}, "there is none of a garment whose seams are not closed or that springs join", "close its seams first, or leave out checkpoint", Category::check});
+    }
+    return;
+  }
+  Checkpoint checkpoint{garment_, {}};
+  mechanics::store_friction(sheet_, checkpoint.garment);
+  Archive archive;
+  store(archive, progress);
+  checkpoint.state = archive.bytes();
+  hooks_.checkpoint(checkpoint);
+}
+
+void Run::show_frame(double time) {
+  if (!hooks_.frame || time < next_frame_ - 1e-9) return;
+  hooks_.frame(time, scatter(x_, sheet_.node_of_vertex), support_x_);
+  while (next_frame_ <= time + 1e-9) next_frame_ += params_.frame_interval;
 }
 
 double widest_link(const Sheet& sheet, const Points3& x) {
@@ -1000,7 +1211,7 @@ void Run::close_seams() {
 }
 
 /// To equilibrium under the loads and paths of the present time. True when it was reached.
-bool Run::relax() {
+bool Run::relax(Progress& progress) {
   step_ = params_.time_step;
   momentum_ = momentum;
   tolerance_ = solver_tolerance;
@@ -1010,11 +1221,23 @@ bool Run::relax() {
   link_offset_.setZero();
   limit_links();
   evaluate(x_, true);
-  double before = static_residual(), best = before;
-  int stalled = 0;
-  // The state may be at rest already, after an increment without any change.
-  if (report_.iterations > 0 && before <= params_.residual && held_error() <= at_target && fastening_.settled()) return true;
-  for (int i = 0; i < params_.max_iterations && !interrupted(); ++i) {
+  double &before = progress.residual, &best = progress.best;
+  int &stalled = progress.stalled, &i = progress.iteration;
+  before = best = static_residual();
+  i = stalled = 0;
+  if (!resume_.empty()) {
+    const std::string state = std::exchange(resume_, {});
+    Archive archive(state);
+    store(archive, progress);
+    evaluate(x_, true);
+  } else if (report_.iterations > 0 && before <= params_.residual && held_error() <= at_target && fastening_.settled()) {
+    return true;  // at rest already, after an increment without any change
+  }
+  for (int taken = 0; i < params_.max_iterations; ++i, ++taken) {
+    if (interrupted() || (taken > 0 && taken % params_.checkpoint_interval == 0)) {
+      leave_checkpoint(progress);
+      if (interrupted()) break;
+    }
     inertia_rate_.setConstant(1 / (step_ * step_));
     iterate();
     accept();
@@ -1127,15 +1350,25 @@ void Run::find_stability() {
 }
 
 /// Equilibria at equal parts of the duration, one after the other.
-void Run::equilibria() {
+Issues Run::equilibria() {
   gravity_part_ = 1;
   report_.converged = true;
   by_increment_ = params_.increments > 1;
-  for (int k = 1; k <= params_.increments && !interrupted(); ++k) {
+  Progress progress;
+  if (!resume_.empty()) {
+    Archive archive(resume_);
+    store(archive, progress);
+    if (!archive.good() || !archive.at_end()) return {damaged_checkpoint()};
+    report_.converged = true;
+  }
+  for (int k = progress.step + 1; k <= params_.increments && !interrupted(); ++k) {
+    progress.step = k - 1;
     set_time(params_.duration * k / params_.increments);
-    increment_start_ = x_;
-    if (by_increment_ && !friction_.empty()) friction_ = follow_friction(friction_, x_, contacts_, x_, support_x_, sheet_.area, laws_, true);
-    if (!relax()) report_.converged = false;
+    if (resume_.empty()) {  // else in the middle of the increment
+      increment_start_ = x_;
+      if (by_increment_ && !friction_.empty()) friction_ = follow_friction(friction_, x_, contacts_, x_, support_x_, sheet_.area, laws_, true);
+    }
+    if (!relax(progress)) report_.converged = false;
     if (by_increment_) friction_ = update_friction(friction_, increment_start_, contacts_, x_, support_x_, sheet_.area, laws_);
     if (params_.stability) find_stability();
     record_row();
@@ -1148,6 +1381,7 @@ void Run::equilibria() {
   }
   if (interrupted()) report_.converged = false;
   report_.residual = static_residual();
+  return {};
 }
 
 /// Velocities of a garment that moves already.
@@ -1192,7 +1426,9 @@ void Run::find_resistance(const Points3& before, const Points3& velocity_before,
 
 /// Euler: x = x0 + h v, v = v0 + h a. Second order: x = (4 x0 - x1)/3 + 2h/3 v, v = (4 v0 - v1)/3 + 2h/3 a, which remembers the step before.
 /// A node that touches something, or did in the last step, goes by Euler: its path has a corner.
-void Run::move_in_time() {
+/// Where a support moves, a step that it does not get through is begun again with half of the time.
+/// error  those of the source of the motion
+Issues Run::move_in_time() {
   gravity_part_ = 1;
   link_offset_.setZero();
   step_ = params_.time_step;
@@ -1202,10 +1438,15 @@ void Run::move_in_time() {
   start_ = x_;
   evaluate(x_, true);
   friction_ = update_friction(friction_, start_, contacts_, x_, support_x_, sheet_.area, laws_);
-  const double h = step_;
   const auto nodes = static_cast<std::size_t>(sheet_.node_count);
-  Points3 before = x_, velocity_before = velocity_;
-  std::vector<char> touched(nodes, 0), touching(nodes, 0);
+  Progress progress;
+  progress.before = x_;
+  progress.velocity_before = velocity_;
+  progress.next_step = params_.time_step;
+  progress.touched.assign(nodes, 0);
+  progress.touching.assign(nodes, 0);
+  Points3 &before = progress.before, &velocity_before = progress.velocity_before;
+  std::vector<char> &touched = progress.touched, &touching = progress.touching;
   const auto mark = [&] {
     touched.swap(touching);
     touching.assign(nodes, 0);
@@ -1222,12 +1463,52 @@ void Run::move_in_time() {
   velocity_rate_.resize(sheet_.node_count);
   inertia_.resize(sheet_.node_count, 3);
   velocity_origin_.resize(sheet_.node_count, 3);
-  for (int i = 0; i < steps && !interrupted(); ++i) {
-    set_time((i + 1) * step_);
+  double &time = progress.time, &next_step = progress.next_step, &last_step = progress.last_step;
+  int& passed = progress.passed;  // steps in a row that did not have to be shortened
+  int& i = progress.step;
+  if (!resume_.empty()) {
+    Archive archive(resume_);
+    store(archive, progress);
+    if (!archive.good() || !archive.at_end()) return {damaged_checkpoint()};
+    if (moving_.moves()) {
+      if (Issues issues = moving_.advance(0, time); !issues.empty()) return issues;
+      if (const auto verdict = moving_.finish(true, wrenches_); !verdict) return verdict.issues();
+    }
     start_ = x_;
+    evaluate(x_, true);
+  } else {
+    show_frame(0);
+  }
+  for (int taken = 0; i < steps; ++taken) {
+    if (interrupted() || (taken > 0 && taken % params_.checkpoint_interval == 0)) {
+      leave_checkpoint(progress);
+      if (interrupted()) break;
+    }
+    // Up to the next multiple of the time step.
+    const double until = (i + 1) * params_.time_step, rest = until - time;
+    const bool to_end = next_step > 0.99 * rest;
+    double h = to_end && rest < params_.time_step * (1 - 1e-9) ? rest : std::min(next_step, params_.time_step);
+    double end = to_end ? until : time + h;
+    if (moving_.moves()) {
+      if (Issues issues = moving_.advance(time, h); !issues.empty()) return issues;
+      if (moving_.next().time < end - 1e-12) {  // the source goes no farther
+        end = moving_.next().time;
+        h = end - time;
+      }
+    }
+    const bool ends_here = end >= until - 1e-12;
+    const bool first = std::abs(h - last_step) > 1e-9 * h;
+    const std::vector<FrictionPair> remembered = friction_;
+    step_ = h;
+    set_time(end);
+    start_ = x_;
+    if (moving_.moves()) {
+      moving_.carry(friction_, start_);
+      support_at(moving_.start(), moving_.start() == moving_.end() ? 1 : 0);
+    }
     for (std::size_t k = 0; k < nodes; ++k) {
       const auto row = static_cast<Eigen::Index>(k);
-      if (params_.integrator != Integrator::implicit && i > 0 && !touched[k] && !touching[k]) {
+      if (params_.integrator != Integrator::implicit && !first && !touched[k] && !touching[k]) {
         velocity_rate_[row] = 1.5 / h;
         velocity_origin_.row(row) = (4 * x_.row(row) - before.row(row)) / 3;
         inertia_.row(row) = velocity_origin_.row(row) + 2 * h / 9 * (4 * velocity_.row(row) - velocity_before.row(row));
@@ -1238,7 +1519,7 @@ void Run::move_in_time() {
       }
     }
     inertia_rate_ = velocity_rate_.cwiseAbs2();
-    find_resistance(before, velocity_before, i == 0);
+    find_resistance(before, velocity_before, first);
     damped_ = true;
     // The sheet has been evaluated here at the end of the last step, but friction between yarns has gone on since, and damping is to be added.
     if (params_.internal_friction == YarnFriction::yes || params_.damping_stiffness > 0) {
@@ -1246,37 +1527,89 @@ void Run::move_in_time() {
     } else {
       add_forces(x_, true);
     }
+    const auto arrived = [&] { return !moving_.moves() || (support_x_ == moving_.end() && held_error() <= at_target); };
     bool done = false;
     for (int k = 0; k < params_.newton_iterations && !done; ++k) {
       step_iteration_ = k;
       const bool moved = iterate();
-      done = promised_ <= params_.newton_accuracy * force_scale() && held_error() <= at_target;
+      done = promised_ <= params_.newton_accuracy * force_scale() && held_error() <= at_target && arrived();
       if (!moved) break;
+    }
+    const bool fine = arrived();
+    bool holds = fine;
+    if (moving_.moves()) {
+      in_step_ = true;
+      std::vector<BodyWrench> found = fine ? wrenches() : std::vector<BodyWrench>{};
+      in_step_ = false;
+      const Result<SupportMotion::Verdict> verdict = moving_.finish(fine, found);
+      if (!verdict) return verdict.issues();
+      holds = fine && *verdict == SupportMotion::Verdict::holds;
+      if (holds) wrenches_ = std::move(found);
+    }
+    if (!holds) {
+      x_ = start_;
+      support_x_ = moving_.start();
+      friction_ = remembered;
+      ++report_.rejected_steps;
+      damped_ = false;
+      evaluate(x_, true);
+      if (fine) continue;  // once more, as it was
+      passed = 0;
+      next_step = 0.5 * h;
+      if (next_step < std::ldexp(params_.time_step, -halvings_max)) {
+        report_squeezed(time);
+        break;
+      }
+      continue;
     }
     if (!done) ++report_.unconverged_steps;
     velocity_before = velocity_;
     before = start_;
     velocity_ = velocity_rate_.asDiagonal() * (x_ - velocity_origin_);
     mark();
+    in_step_ = true;
+    log_row("moving");
+    record_row();
+    in_step_ = false;
     mechanics::advance_friction(sheet_, x_);  // the sheet's second derivative changes with it, and the energy's zero
     friction_ = update_friction(friction_, start_, contacts_, x_, support_x_, sheet_.area, laws_);
     if (advance_fasteners()) evaluate(x_, true);
-    report_.simulated_time = (i + 1) * step_;
-    log_row("moving");
-    record_row();
-    if (hooks_.progress) hooks_.progress(static_cast<double>(i + 1) / steps, fmt::format("t = {:.3f} s", report_.simulated_time));
+    report_.simulated_time = time = ends_here ? until : end;
+    last_step = h;
+    if (++passed >= 2) next_step = std::min(params_.time_step, 2 * next_step);
+    if (ends_here) ++i;
+    show_frame(time);
+    if (hooks_.progress) hooks_.progress(time / (steps * params_.time_step), fmt::format("t = {:.3f} s", report_.simulated_time));
   }
   start_ = x_;
   damped_ = false;
   evaluate(x_, true);
   report_.residual = static_residual();
-  report_.converged = true;
+  report_.converged = findings_.empty() || std::none_of(findings_.begin(), findings_.end(), [](const Issue& issue) { return issue.code == "squeezed"; });
+  return {};
 }
+
+/// The cloth has no way out of a support's way: where.
+void Run::report_squeezed(double time) {
+  std::string panel = "cloth", place;
+  if (stuck_node_ >= 0 && stuck_node_ < sheet_.cloth_nodes) {
+    for (Eigen::Index v = 0; v < sheet_.node_of_vertex.size(); ++v) {
+      if (sheet_.node_of_vertex[v] != stuck_node_) continue;
+      panel = "panel " + garment_.panels[static_cast<std::size_t>(garment_.vertex_panel[v])].name;
+      break;
+    }
+    place = fmt::format(" at ({:.3f}, {:.3f}, {:.3f}) m", x_(stuck_node_, 0), x_(stuck_node_, 1), x_(stuck_node_, 2));
+  }
+  findings_.push_back(Issue{"squeezed", {.item = panel}, fmt::format("has no way out of the moving support{}; the run ended at {:.6g} s", place, time),
+                            "leave room for the cloth's thickness between what moves, hold the cloth otherwise, or shorten time_step", Category::check});
+}
+
 
 /// Pairs near enough to touch before the list is made again, as unilateral constraints with their present normals.
 void Run::list_contacts(const Points3& x, ConstraintSet& set) {
   find_contacts(x, {laws_.self.reach + contact_skin * laws_.self.reach, laws_.support.reach + contact_skin * laws_.support.reach});
   set.contacts.clear();
+  support_contacts_.clear();
   contact_sums_ = {0, 0, std::max(laws_.self.reach, laws_.support.reach)};
   const auto add = [&](const contact::Contact& c) {
     const auto [first, last] = cloth_nodes(c.kind);
@@ -1304,10 +1637,31 @@ void Run::list_contacts(const Points3& x, ConstraintSet& set) {
       }
     }
     contact_sums_.least_gap = std::min(contact_sums_.least_gap, distance);
-    if (moves) set.contacts.push_back(u);
+    if (!moves) return;
+    if (moving_.moves() && c.kind > contact::Kind::edge_edge) support_contacts_.push_back({set.contacts.size(), c});
+    set.contacts.push_back(u);
   };
   for (const contact::Contact& c : contacts_.self) add(c);
   for (const contact::Contact& c : contacts_.support) add(c);
+}
+
+/// Contacts with a support that moves, in the step that begins: where it is and how fast.
+void Run::move_contacts(ConstraintSet& set, double step) const {
+  for (const SupportContact& s : support_contacts_) {
+    const auto [first, last] = cloth_nodes(s.contact.kind);
+    Eigen::Vector3d place = Eigen::Vector3d::Zero(), velocity = Eigen::Vector3d::Zero();
+    for (int k = 0; k < 4; ++k) {
+      if (k >= first && k < last) continue;
+      const auto i = static_cast<std::size_t>(k);
+      const int node = s.contact.node[i];
+      place += s.contact.weight[i] * moving_.start().row(node).transpose();
+      velocity += s.contact.weight[i] / step * (moving_.end().row(node) - moving_.start().row(node)).transpose();
+    }
+    Unilateral& u = set.contacts[s.index];
+    u.offset = laws_.of(s.contact.kind).reach - u.normal.dot(place);
+    u.offset_rate = -u.normal.dot(velocity);
+    u.surface_velocity = velocity;
+  }
 }
 
 /// The published way: Euler in two steps, constraints and contacts by Lagrange multipliers, collisions looked at between the steps.
@@ -1367,7 +1721,7 @@ Issues Run::integrate_explicitly() {
   std::vector<int> held_nodes;  // in the order of the constraints: those at rest, then those on a path
   for (const bool moving : {false, true}) {
     for (const Held& held : held_) {
-      if (held.spec.times.empty() == moving) continue;
+      if ((held.spec.times.empty() && held.body < 0) == moving) continue;
       for (int node : held.nodes) {
         held_nodes.push_back(node);
         const Eigen::Vector3d start = hold_start_.row(node).transpose();
@@ -1376,6 +1730,14 @@ Issues Run::integrate_explicitly() {
           continue;
         }
         const double h = options.time_step;
+        if (held.body >= 0) {
+          system.constraints.trajectories.push_back({node, [this, &held, start](double) {
+            const Eigen::Vector3d now = moving_.since_beginning(held.body, moving_.now())(start);
+            const double span = moving_.next().time - moving_.now().time;
+            return PathState{now, span > 0 ? Eigen::Vector3d((moving_.since_beginning(held.body, moving_.next())(start) - now) / span) : Eigen::Vector3d::Zero()};
+          }});
+          continue;
+        }
         system.constraints.trajectories.push_back({node, [&held, start, h](double time) {
           const Eigen::Vector3d now = motion_at(held.spec, held.centre, time)(start);
           return PathState{now, (motion_at(held.spec, held.centre, time + h)(start) - now) / h};
@@ -1395,8 +1757,9 @@ Issues Run::integrate_explicitly() {
 
   // Nothing that is not in the list can touch before a node has moved half the skin. Then the straight ways since the last look
   // are searched for impacts, and the list is made again.
-  Points3 checked = x_;
+  Points3 checked = x_, checked_support = support_x_;
   double checked_time = 0;
+  bool squeezed = false, relist = false;
   const double allowed = 0.5 * contact_skin * std::min(laws_.self.reach, support_ ? laws_.support.reach : laws_.self.reach);
   list_contacts(x_, provot.system().constraints);
   contact::LimitOptions limit_options;
@@ -1408,22 +1771,57 @@ Issues Run::integrate_explicitly() {
       for (std::size_t i = begin; i < last; ++i) most = std::max(most, (end.row(static_cast<Eigen::Index>(i)) - checked.row(static_cast<Eigen::Index>(i))).squaredNorm());
       return most;
     }, [](double a, double b) { return std::max(a, b); });
-    if (!(moved_sq > allowed * allowed)) return;
+    double most = std::sqrt(moved_sq);
+    if (moving_.moves() && support_) most = std::max(most, std::sqrt((moving_.end() - checked_support).rowwise().squaredNorm().maxCoeff()));
+    if (!(most > allowed)) return;
     phase("limit");
-    const contact::StepLimit& limit = search_->limit_step(checked, end, support_x_, support_x_, limit_options);
-    last_fraction_ = limit.least_fraction;
-    if (limit.limited_nodes > 0) {
-      const double elapsed = std::max(provot.state().time + provot.time_step() - checked_time, provot.time_step());
+    const Points3& support_end = moving_.moves() && support_ ? moving_.end() : support_x_;
+    const double elapsed = std::max(provot.state().time + provot.time_step() - checked_time, provot.time_step());
+    for (int round = 0;; ++round) {
+      const contact::StepLimit& limit = search_->limit_step(checked, end, checked_support, support_end, limit_options);
+      last_fraction_ = limit.least_fraction;
+      if (limit.limited_nodes == 0) break;
+      const bool in_the_way = limit.support_fraction < 1;
+      if (in_the_way && round == shared_limits) {
+        stuck_node_ = static_cast<int>(std::min_element(limit.fraction.begin(), limit.fraction.end()) - limit.fraction.begin());
+        squeezed = true;
+        return;
+      }
+      // What is in the way of a support goes with it, and so much of its own way as is free.
+      Points3 carried = Points3::Zero(in_the_way ? end.rows() : 0, 3);
+      if (in_the_way) {
+        for (const SupportContact& s : support_contacts_) {
+          const auto [first, last] = cloth_nodes(s.contact.kind);
+          Eigen::RowVector3d way = Eigen::RowVector3d::Zero();
+          double sum = 0;
+          for (int k = 0; k < 4; ++k) {
+            const auto i = static_cast<std::size_t>(k);
+            if (k >= first && k < last) continue;
+            way += s.contact.weight[i] * (support_end.row(s.contact.node[i]) - checked_support.row(s.contact.node[i]));
+            sum += s.contact.weight[i];
+          }
+          for (int k = first; k < last; ++k) carried.row(s.contact.node[static_cast<std::size_t>(k)]) = way / sum;
+        }
+      }
       for (Eigen::Index i = 0; i < end.rows(); ++i) {
-        if (limit.fraction[static_cast<std::size_t>(i)] >= 1) continue;
-        end.row(i) = limit.x.row(i);
+        const double fraction = limit.fraction[static_cast<std::size_t>(i)];
+        if (fraction >= 1) continue;
+        if (in_the_way) {
+          const Eigen::RowVector3d with = carried.row(i);
+          end.row(i) = checked.row(i) + with + fraction * (end.row(i) - checked.row(i) - with);
+        } else {
+          end.row(i) = limit.x.row(i);
+        }
         velocity.row(i) = (end.row(i) - checked.row(i)) / elapsed;
       }
+      if (!in_the_way) break;
     }
     phase("contact");
     checked = end;
+    checked_support = support_end;
+    support_x_ = support_end;
     checked_time = provot.state().time + provot.time_step();
-    list_contacts(checked, provot.system().constraints);
+    relist = true;  // once the step's forces have been read
     phase("sheet");
   };
 
@@ -1440,7 +1838,65 @@ Issues Run::integrate_explicitly() {
   while (provot.state().time < until - 0.5 * provot.time_step() && !interrupted()) {
     if (ramped) set_time(provot.state().time);
     time_ = provot.state().time;
+    if (moving_.moves()) {
+      if (Issues issues = moving_.advance(provot.state().time, std::min(provot.time_step(), until - provot.state().time)); !issues.empty()) return issues;
+      move_contacts(provot.system().constraints, provot.time_step());
+    }
+    const ProvotState before = moving_.moves() ? provot.state() : ProvotState{};
+    const Points3 checked_before = moving_.moves() ? checked : no_points, support_before = checked_support;
+    const double checked_time_before = checked_time;
     const ConstraintReport step = provot.step();
+    if (squeezed) {
+      if (const auto verdict = moving_.finish(false, {}); !verdict) return verdict.issues();
+      provot.state() = before;
+      provot.state().x = checked;
+      report_squeezed(before.time);
+      break;
+    }
+    if (moving_.moves()) {
+      std::vector<BodyWrench> found(moving_.bodies().size());
+      const ConstraintSet& set = provot.system().constraints;
+      for (const SupportContact& s : support_contacts_) {
+        const auto [first, last] = cloth_nodes(s.contact.kind);
+        Eigen::Vector3d place = Eigen::Vector3d::Zero();
+        double sum = 0;
+        for (int k = 0; k < 4; ++k) {
+          const auto i = static_cast<std::size_t>(k);
+          if (k >= first && k < last) continue;
+          place += s.contact.weight[i] * moving_.start().row(s.contact.node[i]).transpose();
+          sum += s.contact.weight[i];
+        }
+        const Eigen::Vector3d force = provot.constraints().contact_force(s.index) * set.contacts[s.index].normal + provot.constraints().friction_force(s.index);
+        moving_.add_contact_force(s.contact, place / sum, sum * force, found);
+      }
+      std::size_t k = 0;
+      for (const bool on_path : {false, true}) {
+        for (const Held& held : held_) {
+          if ((held.spec.times.empty() && held.body < 0) == on_path) continue;
+          for (int node : held.nodes) {
+            if (held.body >= 0) moving_.add_force(held.body, before.x.row(node).transpose(), -provot.constraints().holding_force(k), found);
+            ++k;
+          }
+        }
+      }
+      const auto verdict = moving_.finish(true, found);
+      if (!verdict) return verdict.issues();
+      if (*verdict == SupportMotion::Verdict::undone) {
+        provot.state() = before;
+        checked = checked_before;
+        support_x_ = checked_support = support_before;
+        checked_time = checked_time_before;
+        relist = false;
+        continue;
+      }
+      wrenches_ = std::move(found);
+    }
+    if (relist) {
+      relist = false;
+      phase("contact");
+      list_contacts(checked, provot.system().constraints);
+      phase("sheet");
+    }
     ++report_.iterations;
     report_.solver_iterations += step.iterations;
     active_contacts = step.active_contacts;
@@ -1484,10 +1940,15 @@ Issues Run::integrate_explicitly() {
     report_.distance_forces.emplace_back(spec.name.empty() ? spec.between[0] : spec.name, provot.constraints().distance_force(k));
   }
   // The end goes through the same check as all that was before it.
-  x_ = search_->limit_step(checked, provot.state().x, support_x_, support_x_, limit_options).x;
+  {
+    const Points3& support_end = moving_.moves() && support_ && !squeezed ? moving_.start() : support_x_;
+    const contact::StepLimit& last = search_->limit_step(checked, provot.state().x, checked_support, support_end, limit_options);
+    support_x_ = last.support_fraction == 1 ? support_end : Points3(checked_support + last.support_fraction * (support_end - checked_support));
+    x_ = last.x;
+  }
   velocity_ = provot.state().v;
   report_.simulated_time = provot.state().time;
-  if (!rest && !interrupted()) report_.converged = true;
+  if (!rest && !interrupted() && !squeezed) report_.converged = true;
   const ContactSums sums = contact_sums_;
   evaluate(x_, true);
   contact_sums_ = sums;
@@ -1561,6 +2022,21 @@ GarmentMesh Run::output() const {
   return result;
 }
 
+/// Where the support is at the start, if it moves.
+Issues Run::begin_motion() {
+  std::vector<std::string> held_by;
+  for (const ConstraintSpec& spec : params_.constraints) {
+    if (!spec.body.empty()) held_by.push_back(spec.body);
+  }
+  if (!hooks_.supports) {
+    if (held_by.empty()) return {};
+    return {Issue{"no_motion", {.item = "constraints"}, fmt::format("body '{}' is to lead the cloth, but nothing says how it moves", held_by.front()), "give the input `motion`"}};
+  }
+  const Issues issues = moving_.begin(*hooks_.supports, support_, held_by, params_.duration);
+  if (issues.empty() && support_) support_x_ = moving_.end();
+  return issues;
+}
+
 Result<SimulationOutcome> Run::go() {
   if (support_) {
     Issues issues = mesh::validate(*support_);
@@ -1574,7 +2050,8 @@ Result<SimulationOutcome> Run::go() {
   }
   const Ids nodes = node_ids(garment_, closed);
   x_ = gather_mean(garment_.x, nodes, nodes.size() == 0 ? 0 : nodes.maxCoeff() + 1);
-  Issues issues = find_constraints();
+  Issues issues = begin_motion();
+  append(issues, find_constraints());
   append(issues, build(nodes));
   if (!issues.empty()) return issues;
 
@@ -1590,18 +2067,40 @@ Result<SimulationOutcome> Run::go() {
   fastening.pull = params_.fastening_pull;
   fastening.thickness = laws_.self.reach;
   fastening_ = Fastening(garment_, garment_.x, fastening);
+  if (!fastening_.empty() && (hooks_.checkpoint || hooks_.resume)) {
+    return Issue{"no_checkpoint", {.item = "checkpoint"}, "a garment with fasteners cannot go on from a checkpoint", "leave out checkpoint and resume"};
+  }
   apply_fasteners();
 
-  clear_start();
-  close_seams();
+  if (hooks_.resume) {
+    resume_ = *hooks_.resume;
+    // What was open at the checkpoint is open in its garment's seams again: the number of nodes tells whether they were closed.
+    std::uint64_t version = 0, saved_nodes = 0;
+    Archive head(resume_);
+    head(version);
+    head(saved_nodes);
+    if (!head.good() || version != 1) return damaged_checkpoint();
+    if (saved_nodes != static_cast<std::uint64_t>(sheet_.node_count)) {
+      const Ids particle = mesh::particles(garment_);
+      x_ = gather_mean(garment_.x, particle, particle.size() == 0 ? 0 : particle.maxCoeff() + 1);
+      issues = build(particle);
+      if (!issues.empty()) return issues;
+      if (saved_nodes != static_cast<std::uint64_t>(sheet_.node_count)) return damaged_checkpoint();
+    }
+  } else {
+    clear_start();
+    close_seams();
+  }
   if (!interrupted()) {
     if (params_.integrator == Integrator::provot) {
       issues = integrate_explicitly();
       if (!issues.empty()) return issues;
     } else if (params_.mode == Mode::equilibrium) {
-      equilibria();
+      issues = equilibria();
+      if (!issues.empty()) return issues;
     } else {
-      move_in_time();
+      issues = move_in_time();
+      if (!issues.empty()) return issues;
     }
   }
   const mechanics::StrainSummary strains = mechanics::strain_summary(sheet_, x_);
@@ -1618,11 +2117,12 @@ Result<SimulationOutcome> Run::go() {
   report_.least_gap = contact_sums_.least_gap;
   for (Eigen::Index i = 0; i < gradient_.rows(); ++i) report_.residual_max = std::max(report_.residual_max, net_force(i, gradient_.row(i)));
   for (std::size_t c = 0; c < held_.size(); ++c) report_.reactions.push_back(reaction(c));
+  for (std::size_t b = 0; b < wrenches_.size(); ++b) report_.bodies.push_back({moving_.bodies()[b], wrenches_[b].force, wrenches_[b].torque});
   check_end();
   check_closures();
   if (interrupted()) {
-    findings_.push_back(Issue{"interrupted", {}, "stopped before the end; the state so far is written", "run again", Category::interrupted});
-  } else if (!report_.converged) {
+    findings_.push_back(Issue{"interrupted", {}, "stopped before the end; the state so far is written", hooks_.checkpoint ? "go on with `resume`" : "run again; with `checkpoint` it could go on", Category::interrupted});
+  } else if (!report_.converged && std::none_of(findings_.begin(), findings_.end(), [](const Issue& issue) { return issue.code == "squeezed"; })) {
     findings_.push_back(Issue{"not_converged", {}, fmt::format("the residual is {:.2e} of the weight after {} iterations, {:.2e} was asked for", report_.residual, report_.iterations, params_.residual),
                               "raise max_iterations or residual", Category::not_converged});
   }

@@ -67,6 +67,7 @@ Result<Plan> make_plan(const Pipeline& pipeline, const std::string& pipeline_fil
 
   std::map<std::string, ToolInfo> tools;
   std::map<std::string, std::string> outputs;
+  std::map<std::string, std::pair<std::string, std::string>> beside;  // stage.parameter -> stage, file
   for (const auto& [name, stage] : pipeline.stages) {
     if (!plain_name(name)) add("stages." + name, "bad_name", fmt::format("'{}' cannot name a file", name), "use letters, digits, '_', '-' and '.'");
     if (!tools.count(stage.tool)) {
@@ -79,6 +80,10 @@ Result<Plan> make_plan(const Pipeline& pipeline, const std::string& pipeline_fil
       }
     }
     outputs[name] = plan.folder + "/" + name + tools[stage.tool].extension;
+    for (const auto& [key, file] : stage.out) {
+      if (!plain_name(file)) add("stages." + name + ".out." + key, "bad_name", fmt::format("'{}' cannot name a file", file), "use letters, digits, '_', '-' and '.'");
+      beside[name + "." + key] = {name, plan.folder + "/" + file};
+    }
   }
 
   std::map<std::string, std::vector<std::string>> before;  // stage -> stages it needs
@@ -107,6 +112,12 @@ Result<Plan> make_plan(const Pipeline& pipeline, const std::string& pipeline_fil
             continue;
           }
           file = found->second;
+        } else if (const auto found = beside.find(reference); found != beside.end()) {
+          // The file is there once the stage's result is.
+          step.needs.push_back(outputs[found->second.first]);
+          before[name].push_back(found->second.first);
+          step.command.push_back(found->second.second);
+          continue;
         } else {
           if (!pipeline.stages.count(reference)) {
             add(item + ".in." + port_name, "unknown_reference", fmt::format("there is no stage '{}'", reference), suggestion(reference, keys(pipeline.stages)) + " (an input is written $name)");
@@ -129,6 +140,7 @@ Result<Plan> make_plan(const Pipeline& pipeline, const std::string& pipeline_fil
       step.command.insert(step.command.end(), {"--spec", spec});
     }
     for (const auto& [key, value] : stage.set) step.command.insert(step.command.end(), {"--" + key, value});
+    for (const auto& [key, file] : stage.out) step.command.insert(step.command.end(), {"--" + key, plan.folder + "/" + file});
     step.command.insert(step.command.end(), {"-o", step.output});
     steps[name] = std::move(step);
   }

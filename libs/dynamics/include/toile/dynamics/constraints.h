@@ -33,6 +33,7 @@ struct ConstraintSpec {
   double from = 0, to = 1;
   std::vector<std::array<double, 2>> region;
   Hold kind = Hold::pin;
+  std::string body;
   std::optional<std::array<double, 3>> along, normal;
   std::vector<double> times;
   std::vector<std::array<double, 3>> move;
@@ -47,7 +48,8 @@ struct ConstraintSpec {
     f(&Spec::from, {.key = "from", .doc = "part of each edge, by arc length: begin", .unit = "1", .min = 0, .max = 1});
     f(&Spec::to, {.key = "to", .doc = "and end", .unit = "1", .min = 0, .max = 1});
     f(&Spec::region, {.key = "region", .doc = "outline in panel coordinates: only what lies inside or on it", .unit = "m"});
-    f(&Spec::kind, {.key = "kind", .doc = "clamp: positions and tangent planes; pin: positions; slide: positions across `normal`, or but for `along`; drive: positions, along a path"});
+    f(&Spec::kind, {.key = "kind", .doc = "clamp: positions and tangent planes; pin: positions; slide: positions across `normal`, or but for `along`; drive: positions, along a path or with a `body`"});
+    f(&Spec::body, {.key = "body", .doc = "the moving body that it is held to; not given: space, or the path"});
     f(&Spec::along, {.key = "along", .doc = "slide: the only direction that is free"});
     f(&Spec::normal, {.key = "normal", .doc = "slide: the only direction that is held"});
     f(&Spec::times, {.key = "times", .doc = "path: times of the rows of `move` and `turn`, increasing; straight in between, held before and after", .unit = "s"});
@@ -59,7 +61,9 @@ struct ConstraintSpec {
       const auto bad = [&](const char* item, const char* what, const char* remedy) { issues.push_back({"bad_constraint", {.item = item}, what, remedy}); };
       if (s.kind == Hold::slide && s.along.has_value() == s.normal.has_value()) bad("kind", "a slide has one direction", "give either `along` or `normal`");
       if (s.kind != Hold::slide && (s.along || s.normal)) bad("kind", "only a slide has `along` or `normal`", "write `kind: slide`");
-      if (s.kind == Hold::drive && s.times.empty()) bad("times", "a drive has a path", "give `times` with `move` or `turn`");
+      if (s.kind == Hold::drive && s.times.empty() && s.body.empty()) bad("times", "a drive has a path", "give `times` with `move` or `turn`, or a `body`");
+      if (!s.body.empty() && !s.times.empty()) bad("body", "what is held to a body follows no path of its own", "leave out `times`, or `body`");
+      if (!s.body.empty() && s.kind == Hold::slide) bad("body", "a slide is in space, not on a body", "use kind drive, pin or clamp");
       if (!s.times.empty() && s.move.empty() && s.turn.empty()) bad("times", "a path says nothing", "give `move` or `turn`");
       if (!s.move.empty() && s.move.size() != s.times.size()) bad("move", "a path has a row for each time", "give as many rows as `times`");
       if (!s.turn.empty() && s.turn.size() != s.times.size()) bad("turn", "a path has an angle for each time", "give as many angles as `times`");

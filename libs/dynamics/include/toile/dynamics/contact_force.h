@@ -46,6 +46,9 @@ struct FrictionPair {
   double limit = 0;                ///< friction coefficient times normal force; infinite: sticks for now [N]
   double stiffness = 0;            ///< [N/m]
   bool fresh = false;              ///< touches since the last balance of forces only
+  std::array<int, 4> support_node{-1, -1, -1, -1};                  ///< -1 for nodes of the cloth
+  Eigen::Vector3d support_way = Eigen::Vector3d::Zero();            ///< the support's part of the motion in the whole step [m]
+  Eigen::Vector3d support_motion = Eigen::Vector3d::Zero();         ///< so far [m]
 };
 
 struct ContactSums {
@@ -60,6 +63,9 @@ double contact_area(const Contact& contact, const Eigen::VectorXd& node_area);
 /// Adds the repulsion of all contacts to the gradient and, unless null, its second derivative to `terms`.
 ContactSums add_repulsion(const contact::Contacts& contacts, const Points3& x, const Points3& support_x, const Eigen::VectorXd& node_area, const ContactLaws& laws,
                           Points3& gradient, std::vector<ContactTerm>* terms);
+
+/// Force of a pair for the motion start -> x: its weights times it are added to the gradient [N].
+Eigen::Vector3d friction_force(const FrictionPair& pair, const Points3& start, const Points3& x);
 
 /// Adds friction of the remembered pairs for the motion start -> x (minus the support's own). The potential of each pair is
 /// quadratic in the elastic slip up to the limit and linear beyond. Returns its energy.

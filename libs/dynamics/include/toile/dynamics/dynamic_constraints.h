@@ -42,6 +42,8 @@ struct Unilateral {
   Eigen::Vector3d normal;  ///< unit
   double offset = 0;       ///< [m]
   double friction = 0;     ///< Coulomb coefficient [1]
+  double offset_rate = 0;  ///< of a surface that moves [m/s]
+  Eigen::Vector3d surface_velocity = Eigen::Vector3d::Zero();  ///< its part of the sliding: against its own velocity [m/s]
 };
 
 struct ConstraintSet {
@@ -82,6 +84,8 @@ class DynamicConstraints {
   double distance_force(std::size_t i) const;
   /// Normal force of the i-th contact [N].
   double contact_force(std::size_t i) const;
+  /// Friction of the i-th contact: its weights times it act on its nodes [N].
+  Eigen::Vector3d friction_force(std::size_t i) const { return friction_[i]; }
 
  private:
   struct Row {
@@ -96,6 +100,7 @@ class DynamicConstraints {
   std::vector<Row> rows_;
   std::vector<char> active_;
   std::vector<double> lambda_, contact_lambda_, rhs_, r_, z_, p_, q_, diagonal_;
+  std::vector<Eigen::Vector3d> friction_;
   std::vector<int> touched_, contact_count_;  ///< nodes of the rows; active contacts of each node
   std::vector<char> is_touched_;
   Points3 push_;                              ///< J^T lambda, zero outside of touched_

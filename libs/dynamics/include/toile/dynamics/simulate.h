@@ -5,6 +5,7 @@
 #include "toile/base/result.h"
 #include "toile/dynamics/constraints.h"
 #include "toile/dynamics/fastening.h"
+#include "toile/dynamics/support_motion.h"
 #include "toile/mechanics/particle.h"
 #include "toile/mesh/garment_mesh.h"
 #include "toile/mesh/support_mesh.h"
@@ -63,10 +64,16 @@ struct SimulationParams {
   std::vector<ConstraintSpec> constraints;
   std::vector<DistanceSpec> distances;
   std::vector<LoadSpec> loads;
+  double motion_begin = 0;
+  std::vector<double> shape_times;
   std::vector<std::string> watch;
   std::string record;
   bool stability = false;
   std::string log;
+  std::string frames, support_frames;
+  double frame_interval = 1.0 / 24;
+  std::string checkpoint, resume;
+  int checkpoint_interval = 100;
 
   static void describe(auto& f) {
     f(&SimulationParams::mode, {.key = "mode", .doc = "equilibrium: until the garment hangs at rest; motion: for `duration` from the given velocities"});
@@ -118,10 +125,18 @@ struct SimulationParams {
     f(&SimulationParams::constraints, {.key = "constraints", .doc = "what is clamped, pinned, guided or driven; a particle named twice follows the first"});
     f(&SimulationParams::distances, {.key = "distances", .doc = "integrator provot: pairs of points that stay at a distance, by dynamic constraints"});
     f(&SimulationParams::loads, {.key = "loads", .doc = "forces on edges, points and regions"});
+    f(&SimulationParams::motion_begin, {.key = "motion_begin", .doc = "input motion: time of its table at which the simulation begins", .unit = "s"});
+    f(&SimulationParams::shape_times, {.key = "shape_times", .doc = "input shapes: time of each, increasing from 0; straight in between", .unit = "s"});
     f(&SimulationParams::watch, {.key = "watch", .doc = "edges, points and panels whose mean position the record has"});
     f(&SimulationParams::record, {.key = "record", .doc = "CSV file with one row per increment or time step: paths, reaction forces and moments, watched positions, energies; empty: none", .local = true});
     f(&SimulationParams::stability, {.key = "stability", .doc = "equilibrium: find the smallest stiffness against mass at the end of each increment, the square of the lowest angular frequency, for summary and record; negative: the equilibrium is unstable"});
     f(&SimulationParams::log, {.key = "log", .doc = "CSV file with one row per iteration: energies, residual, contacts, strains; empty: none", .local = true});
+    f(&SimulationParams::frames, {.key = "frames", .doc = "motion: file of the cloth's vertices through time: NAME.mdd, NAME.pc2, or NAME_*.ply for a garment each, the star becomes a number; empty: none", .local = true});
+    f(&SimulationParams::support_frames, {.key = "support_frames", .doc = "motion: the same of the support, NAME.mdd or NAME.pc2; empty: none", .local = true});
+    f(&SimulationParams::frame_interval, {.key = "frame_interval", .doc = "time between frames: the first state at or after each multiple is taken", .unit = "s", .min = 1e-6, .max = 1e4, .local = true});
+    f(&SimulationParams::checkpoint, {.key = "checkpoint", .doc = "file of all that it takes to go on: written every checkpoint_interval and on Ctrl-C; empty: none", .local = true});
+    f(&SimulationParams::checkpoint_interval, {.key = "checkpoint_interval", .doc = "time steps (motion) or iterations (equilibrium) between checkpoints", .min = 1, .max = 1e9, .local = true});
+    f(&SimulationParams::resume, {.key = "resume", .doc = "checkpoint to go on from, with the same inputs and parameters; empty: from the beginning", .local = true});
     f.check([](const SimulationParams& p, Issues& issues) {
       const auto table = [&](const char* item, const std::vector<double>& times, const std::vector<double>& values) {
         if (times.size() != values.size()) issues.push_back({"bad_table", {.item = item}, "there must be a factor for each time", "give as many as times"});
@@ -142,12 +157,26 @@ struct SimulationParams {
       if (p.internal_friction == YarnFriction::yes && (p.model == Model::particle || p.integrator == Integrator::provot)) {
         bad("internal_friction", "only model woven with an implicit integrator has friction between yarns", "leave internal_friction at no, or change model and integrator");
       }
+      if (p.mode != Mode::motion && !(p.frames.empty() && p.support_frames.empty())) bad("frames", "there are frames in motion only", "write `mode: motion`, or leave out frames");
+      const auto ends = [](const std::string& path, const char* ending) { return path.ends_with(ending); };
+      if (!p.frames.empty() && !ends(p.frames, ".mdd") && !ends(p.frames, ".pc2") && !(ends(p.frames, ".ply") && p.frames.find('*') != std::string::npos)) {
+        bad("frames", "the file's name says no format", "write NAME.mdd, NAME.pc2 or NAME_*.ply");
+      }
+      if (!p.support_frames.empty() && !ends(p.support_frames, ".mdd") && !ends(p.support_frames, ".pc2")) bad("support_frames", "the file's name says no format", "write NAME.mdd or NAME.pc2");
+      if (p.integrator == Integrator::provot && !(p.frames.empty() && p.support_frames.empty())) bad("frames", "integrator provot shows no frames", "leave out frames, or change the integrator");
+      if (p.integrator == Integrator::provot && !(p.checkpoint.empty() && p.resume.empty())) bad("checkpoint", "integrator provot leaves no checkpoints", "leave out checkpoint and resume");
       if (!p.distances.empty() && p.integrator != Integrator::provot) bad("distances", "only integrator provot holds distances", "write `integrator: provot`, or join the points by a trim or fastener");
       for (const ConstraintSpec& c : p.constraints) {
         if (c.kind == Hold::clamp && (p.model == Model::particle || p.integrator == Integrator::provot)) {
           bad("constraints", "kind clamp holds tangent planes, which only model woven with the implicit integrator has", "hold two rows of particles with kind pin and a region");
         }
         if (c.kind == Hold::slide && p.integrator == Integrator::provot) bad("constraints", "integrator provot holds whole positions only", "use kind pin or drive, or the implicit integrator");
+      }
+      for (std::size_t i = 0; i < p.shape_times.size(); ++i) {
+        if (i == 0 ? p.shape_times[0] != 0 : !(p.shape_times[i] > p.shape_times[i - 1])) {
+          issues.push_back({"bad_table", {.item = "shape_times"}, "times of shapes begin at 0 and increase", "sort them"});
+          break;
+        }
       }
       if (!(p.gravity_direction[0] != 0 || p.gravity_direction[1] != 0 || p.gravity_direction[2] != 0)) issues.push_back({"bad_direction", {.item = "gravity_direction"}, "a direction has no length", "give another vector"});
     });
@@ -168,10 +197,22 @@ struct Untangling {
   double largest_move = 0;  ///< [m]
 };
 
+/// The middle of a run. The garment is the one that the run began with, with what its yarns remember.
+struct Checkpoint {
+  mesh::GarmentMesh garment;
+  std::string state;  ///< bytes for SimulationHooks::resume
+};
+
 /// How the caller follows a run; any may be empty.
 struct SimulationHooks {
   std::function<void(double fraction, const std::string& text)> progress;
   std::function<bool()> interrupted;
+  /// The state on the way, every `frame_interval`: vertices of the garment and of the support [m].
+  std::function<void(double time, const Points3& garment, const Points3& support)> frame;
+  /// All that it takes to go on, every `checkpoint_interval` and when interrupted.
+  std::function<void(const Checkpoint&)> checkpoint;
+  const std::string* resume = nullptr;  ///< a checkpoint's state to go on from, with its garment in the place of the given one
+  SupportMotion* supports = nullptr;  ///< motion: where the bodies of the support go; null: it stands still
   std::function<void(const char* phase)> phase;  ///< called when a part of the work begins: "sheet", "contact", "solve", "limit", "check", "other"
 };
 
@@ -188,8 +229,10 @@ struct SimulationReport {
   double least_gap = 0;           ///< [m]
   double seam_gap_max = 0;        ///< before merging; 0 once all are closed [m]
   int seams_open = 0;             ///< particle pairs not closed
+  int rejected_steps = 0;         ///< motion: steps begun again with half of their time
   int unconverged_steps = 0;      ///< motion: time steps that ended before their energy was low enough
   std::vector<Reaction> reactions;
+  std::vector<Reaction> bodies;   ///< what the cloth does to each body that moves at the end; moment about the body's shifted origin
   std::vector<std::pair<std::string, double>> distance_forces;  ///< of held distances at the end; positive: pushes the two apart [N]
   int start_inside = 0, start_intersections = 0;
   int start_left = 0;             ///< intersections of the start that could not be undone

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "toile/base/fields.h"
+#include "toile/io/frames.h"
 #include "toile/mesh/garment_mesh.h"
 #include "toile/mesh/support_mesh.h"
 
@@ -25,6 +26,14 @@ std::string format_obj(const mesh::SupportMesh& support);
 enum class GltfContainer { json, binary };
 std::string format_gltf(const mesh::GarmentMesh& garment, GltfContainer container);
 std::string format_gltf(const mesh::SupportMesh& support, GltfContainer container);
+
+/// Frames as morph targets with one animation; normals stay those of the mesh. Both sequences have the same times.
+struct Animation {
+  const FrameSequence* garment = nullptr;
+  const FrameSequence* support = nullptr;
+};
+/// Precondition: frames have as many points as the mesh that they move.
+std::string format_gltf(const mesh::GarmentMesh& garment, const mesh::SupportMesh* support, const Animation& animation, GltfContainer container);
 
 /// All columns as arrays: points with u, v, panel, particle and further vertex columns, polygons with panel, laminate and
 /// further face columns. Raw appended doubles and 32-bit integers, little-endian; or ascii.

@@ -12,14 +12,16 @@ namespace toile::stage {
 
 struct PipelineStage {
   std::string tool;
-  std::map<std::string, std::vector<std::string>> in;  ///< port -> `$input` or the name of a stage
+  std::map<std::string, std::vector<std::string>> in;  ///< port -> `$input`, the name of a stage, or stage.parameter for a file beside its result
   std::string spec;                                    ///< file beside the pipeline; empty: defaults
   std::map<std::string, std::string> set;              ///< single parameters, as on the command line
+  std::map<std::string, std::string> out;              ///< parameters that name further files: name in the garment's folder
   static void describe(auto& f) {
     f(&PipelineStage::tool, {.key = "tool", .doc = "program, e.g. toile-mesh", .required = true});
-    f(&PipelineStage::in, {.key = "in", .doc = "input port: $name of an input, or a stage"});
+    f(&PipelineStage::in, {.key = "in", .doc = "input port: $name of an input, a stage, or stage.parameter for what its `out` names"});
     f(&PipelineStage::spec, {.key = "spec", .doc = "parameter file, relative to the pipeline"});
     f(&PipelineStage::set, {.key = "set", .doc = "single parameters, as on the command line"});
+    f(&PipelineStage::out, {.key = "out", .doc = "parameters that name files written beside the result, such as `record`: their names in the garment's folder"});
   }
 };
 
