@@ -1,6 +1,6 @@
 # The front door. `make help` lists what there is; CMake does the work in build/release.
 .DEFAULT_GOAL := help
-.PHONY: help deps configure tools tee skirt trousers jacket waistcoat softtop test validate bench docs asan ubsan clean
+.PHONY: help deps configure tools tee skirt trousers jacket waistcoat softtop softtop-coupled test validate bench docs asan ubsan clean
 BUILD := build/release
 JOBS ?= $(shell nproc)
 
@@ -11,6 +11,7 @@ help:
 	@echo 'make jacket   a man'"'"'s jacket, shell and lined jacket put on a dress form, the shell buttoned and at rest'
 	@echo 'make waistcoat   the same of a waistcoat'
 	@echo 'make softtop  a convertible'"'"'s soft top, from the drawing of its frame to rest on the closed frame and open in a second'
+	@echo 'make softtop-coupled   opens it once more, frame and cloth as two programs that talk: torque at the motor'
 	@echo 'make test     build and run all tests'
 	@echo 'make validate   the virtual laboratory: tests of textiles and shells against theory, report in build/validation'
 	@echo 'make bench    time the tee stage by stage, cutting, sewing and layering of up to a million triangles, placement,'
@@ -30,6 +31,9 @@ tools: configure
 
 tee skirt trousers jacket waistcoat softtop: tools
 	@$(BUILD)/bin/toile run pipelines/$@/pipeline.yaml --build build/garments -j $(JOBS)
+
+softtop-coupled: softtop
+	@pipelines/softtop/coupled.sh $(BUILD)/bin build/garments/softtop
 
 test: configure
 	@cmake --build $(BUILD) -j $(JOBS)

@@ -1,6 +1,6 @@
 #include "toile/base/hash.h"
 #include "toile/base/text.h"
-#include "toile/dynamics/simulate.h"
+#include "toile/coupling/coupled_simulation.h"
 #include "toile/io/file.h"
 #include "toile/io/frames.h"
 #include "toile/io/ply.h"
@@ -18,7 +18,7 @@ using namespace toile;
 namespace {
 
 struct SimulateStage {
-  using Params = dynamics::SimulationParams;
+  using Params = coupling::CoupledSimulationParams;
 
   static stage::Description description() {
     return {.name = "toile-simulate",
@@ -36,8 +36,12 @@ struct SimulateStage {
   }
 
   /// How the support moves; nothing where it stands still.
-  static Result<std::unique_ptr<dynamics::SupportMotion>> motion(const Params& params, const stage::Run& run) {
+  static Result<std::unique_ptr<dynamics::SupportMotion>> motion(const Params& params, const std::optional<mesh::SupportMesh>& support, const stage::Run& run) {
     const bool table = run.has("motion"), shapes = run.has("shapes");
+    if (params.couple) {
+      if (table || shapes) return Issue{"bad_combination", {.item = "couple"}, "a support is moved by another program or by a file, not both", "leave out `couple`, or the inputs `motion` and `shapes`", Category::usage};
+      return coupling::coupled_support(params, support, [] { return stage::Run::interrupted(); });
+    }
     if (!table && !shapes) {
       if (params.shape_times.empty()) return std::unique_ptr<dynamics::SupportMotion>();
       return Issue{"no_motion", {.item = "shape_times"}, "there are times of shapes, but no shapes", "give the input `shapes`", Category::usage};
@@ -130,7 +134,7 @@ struct SimulateStage {
       if (!read) return read.issues();
       support = std::move(*read);
     }
-    TOILE_TRY(const std::unique_ptr<dynamics::SupportMotion> supports, motion(params, run));
+    TOILE_TRY(const std::unique_ptr<dynamics::SupportMotion> supports, motion(params, support, run));
     dynamics::SimulationHooks hooks;
     hooks.supports = supports.get();
     hooks.progress = [&](double fraction, const std::string& text) { run.progress(fraction, text); };

@@ -1,4 +1,4 @@
-#include "toile/coupling/coupled_motion.h"
+#include "toile/coupling/coupled_simulation.h"
 
 #include "toile/base/text.h"
 #include "toile/coupling/session.h"
@@ -154,6 +154,23 @@ Result<std::unique_ptr<dynamics::SupportMotion>> coupled_motion(const ChannelOpt
   auto channel = Channel::listen(options);
   if (!channel) return channel.issues();
   return coupled_motion(std::move(*channel), coupled);
+}
+
+Result<std::unique_ptr<dynamics::SupportMotion>> coupled_support(const CoupledSimulationParams& params, const std::optional<mesh::SupportMesh>& support, std::function<bool()> interrupted) {
+  CoupledOptions options;
+  options.longest_step = params.time_step;
+  options.interrupted = std::move(interrupted);
+  if (support) {
+    options.known = support->region_names;
+    for (const mesh::RouteEntry& entry : support->route) {
+      const auto linkage = entry.inputs.find("linkage");
+      if (entry.stage == "toile-mechanism" && linkage != entry.inputs.end()) options.model = linkage->second;
+    }
+  }
+  for (const dynamics::ConstraintSpec& c : params.constraints) {
+    if (!c.body.empty()) options.known.push_back(c.body);
+  }
+  return coupled_motion(*params.couple, options);
 }
 
 }  // namespace toile::coupling

@@ -118,14 +118,15 @@ class Drive {
       const bool to_end = fixed || next > 0.99 * rest;
       const double to = to_end ? until : master.time() + next;
       // The length as the simulation reckons it, so that a table is read at the same times to the last bit.
-      const auto done = step(master, to, to_end && rest < whole * (1 - 1e-9) ? rest : std::min(next, whole));
+      const double length = to_end && rest < whole * (1 - 1e-9) ? rest : std::min(next, whole);
+      const auto done = step(master, to, length);
       if (!done) return done.issues();
       if (*done > 0) {
         if (fixed) {
           return own({Issue{"refused", {.item = "time_step"}, fmt::format("the cloth refused the step at {:g} s: {}", master.time(), why_), "give a shorter time_step, or `steps: variable`", Category::check}});
         }
         const double tried = to - master.time();
-        next = std::min(*done, 0.5 * tried);
+        next = std::min(*done, 0.5 * length);
         passed = 0;
         if (next < params_.least_step) {
           return own({Issue{"step_too_short", {.item = "least_step"}, fmt::format("at {:g} s even {:.3g} s is too long: {}", master.time(), tried, why_), "see what holds the cloth there, or give a smaller least_step", Category::check}});
@@ -161,7 +162,7 @@ class Drive {
       if (const auto* refused = std::get_if<Refused>(&*answer)) {
         ++outcome_.report.refused;
         why_ = refused->why;
-        return refused->longest > 0 ? refused->longest : 0.5 * h;
+        return refused->longest > 0 ? refused->longest : 0.5 * length;
       }
       const double found = on_driver(*configuration, std::get<Reached>(*answer).wrenches);
       const auto inertia = dynamics_.at(next->angle);
