@@ -22,7 +22,7 @@ struct SimulateStage {
 
   static stage::Description description() {
     return {.name = "toile-simulate",
-            .version = 15,
+            .version = 16,
             .summary = "Lets a placed garment hang to rest on a body, or move in time.",
             .example = "toile-simulate placed.ply --support form.ply -o draped.ply",
             .details = "Open seams are drawn together first; then the garment relaxes until the sum of all net forces is a given part of its "
