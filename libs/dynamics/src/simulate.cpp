@@ -60,7 +60,6 @@ constexpr double quiet_move = 2e-4;   // below it the step grows [m]
 // Where a garment comes down to its rest the step grows below moves of this part of a cell (by about this angle cells turn, and half its square is how
 // they stretch) and does not mind a rise of the residual (a move of a millimetre leaves tens of weights behind, which the next iteration takes away).
 constexpr double quiet_turn = 0.12, rise_coming_down = 100, careful_rise = 4;
-constexpr double near_rest = 1;       // residual below which the second derivative is then the true one, not its positive part
 constexpr int stall_limit = 30;       // iterations without a better residual
 constexpr double solved_well = 0.25;  // part of the net force left after one iteration, below it the step grows
 // Places of the cloth nearer to each other within it than so many reaches do not touch: folded so tightly, cloth would lie in its own
@@ -258,7 +257,6 @@ class Run {
   SolveReport solve_report_;
   int step_iteration_ = 0;  // Newton iterations before this one in its time step
   double momentum_ = momentum, tolerance_ = solver_tolerance, slack_ = energy_slack;  // sharper once the relaxation stalls
-  bool near_rest_ = false;  // the second derivative at hand is the true one
   double promised_ = 0;   // what the last direction promised to take off the energy of the step [J]
   double last_total_ = 1e300, last_left_ = 0, last_move_ = 0, last_fraction_ = 1, last_alpha_ = 1;
   std::vector<Float4> rhs_, direction_, given_, product_;
@@ -645,7 +643,7 @@ void Run::find_contacts(const Points3& x, contact::Radii radii) {
 /// Energies, gradient and if asked the second derivative at x. Inertia is left to the caller.
 void Run::evaluate(const Points3& x, bool with_matrix) {
   phase("sheet");
-  const auto curvature = with_matrix ? std::optional(near_rest_ ? mechanics::Curvature::exact : mechanics::Curvature::positive) : std::nullopt;
+  const auto curvature = with_matrix ? std::optional(mechanics::Curvature::positive) : std::nullopt;
   if (particle_) {
     if (with_matrix) std::swap(response_.matrix, particle_response_.matrix);
     mechanics::evaluate(*particle_, x, link_offset_, curvature, particle_response_);
@@ -1045,7 +1043,7 @@ void Run::store(Archive& a, Progress& p) {
   a(p.step), a(p.time), a(p.next_step), a(p.last_step), a(p.passed), a(p.before), a(p.velocity_before), a(p.touched), a(p.touching);
   a(p.iteration), a(p.stalled), a(p.residual), a(p.best);
   a(x_), a(velocity_), a(start_), a(increment_start_), a(inertia_), a(hold_start_), a(support_x_);
-  a(step_), a(momentum_), a(tolerance_), a(slack_), a(last_total_), a(last_left_), a(last_move_), a(last_fraction_), a(last_alpha_), a(promised_), a(next_frame_), a(stuck_node_), a(near_rest_);
+  a(step_), a(momentum_), a(tolerance_), a(slack_), a(last_total_), a(last_left_), a(last_move_), a(last_fraction_), a(last_alpha_), a(promised_), a(next_frame_), a(stuck_node_);
   for (Held& held : held_) a(held.centre);
   std::uint64_t pairs = friction_.size();
   a(pairs);
@@ -1225,7 +1223,6 @@ bool Run::relax(Progress& progress) {
   inertia_ = start_ = x_;
   link_offset_.setZero();
   limit_links();
-  near_rest_ = false;
   evaluate(x_, true);
   // The equilibria of a laboratory follow one another closely, and yarns that slip have corners in their energy: both want care, not speed.
   const bool comes_down = params_.increments == 1 && !sheet_.friction;
@@ -1247,7 +1244,6 @@ bool Run::relax(Progress& progress) {
       leave_checkpoint(progress);
       if (interrupted()) break;
     }
-    near_rest_ = comes_down && before < near_rest;
     inertia_rate_.setConstant(1 / (step_ * step_));
     iterate();
     accept();

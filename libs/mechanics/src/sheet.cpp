@@ -18,7 +18,7 @@ constexpr std::size_t grain = 1024;
 // Part of a pair's stretch energy that either face keeps for itself, so that opposite stretches in the two are not free: so many times as stiff as
 // the shear of the cloth, at most a tenth. A part of the stretch alone would lock the more, the easier the cloth shears; with the shear alone, single
 // triangles at corners where seams pull would stretch by a tenth.
-constexpr double own_over_shear = 25, most_own_part = 0.1;
+constexpr double own_over_shear = 10, most_own_part = 0.1;
 
 struct Triplet {
   int row, column;
